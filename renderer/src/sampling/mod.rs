@@ -1,0 +1,5 @@
+//! Random numbers, low-discrepancy points, warps and discrete distributions.
+
+mod sampler;
+
+pub use sampler::Sampler;

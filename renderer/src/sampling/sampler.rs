@@ -1,0 +1,11 @@
+use crate::math::Vec2;
+
+/// The source of a path's numbers in [0, 1): a pure function of (seed, replicate, pixel or path, sample index, dimension).
+///
+/// Integrators are generic over it, so that the same walk is driven by Sobol points or by a chain's primary-sample vector.
+pub trait Sampler {
+    /// The next number.
+    fn next_1d(&mut self) -> f32;
+    /// The next two numbers, well distributed in the unit square.
+    fn next_2d(&mut self) -> Vec2;
+}

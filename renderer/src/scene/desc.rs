@@ -1,0 +1,213 @@
+//! What every importer produces: plain data with typed indices. Metres, right-handed, +Y up, linear Rec.709 radiance.
+
+use crate::bsdf::{Material, MaterialId};
+use crate::geometry::{Mesh, MeshId};
+use crate::math::{DAffine3, DVec3};
+use crate::spectrum::Rgb;
+use crate::texture::{Image, RgbParam, Texture};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A whole scene.
+#[derive(Clone, Debug, Default)]
+pub struct SceneDesc {
+    /// Shared geometry.
+    pub meshes: Vec<Mesh>,
+    /// Placed objects.
+    pub shapes: Vec<ShapeDesc>,
+    /// Shared textures.
+    pub textures: Vec<Texture>,
+    /// Shared materials.
+    pub materials: Vec<Material>,
+    /// Lights other than emitting shapes.
+    pub lights: Vec<LightDesc>,
+    /// The one camera that renders.
+    pub camera: CameraDesc,
+    /// What the scene file says of rendering; the command line overrides it.
+    pub defaults: RenderDefaults,
+}
+
+/// What a placed object is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShapeKind {
+    /// A mesh; used by several shapes it is instanced, not copied.
+    Mesh(MeshId),
+    /// The unit sphere.
+    Sphere,
+    /// The unit disk in xy, normal +z.
+    Disk,
+    /// The square [-1, 1]^2 in xy, normal +z, uv from (0, 0) at (-1, -1) to (1, 1).
+    Rectangle,
+    /// The cube [-1, 1]^3, normals outward, uv [0, 1]^2 on each face.
+    Cube,
+}
+
+/// A placed object.
+#[derive(Clone, Debug)]
+pub struct ShapeDesc {
+    /// For messages.
+    pub name: String,
+    /// What it is.
+    pub kind: ShapeKind,
+    /// Object to world, composed in f64.
+    pub to_world: DAffine3,
+    /// Turns normals round.
+    pub flip_normals: bool,
+    /// What it is made of.
+    pub material: MaterialId,
+    /// Light it emits, if any.
+    pub emission: Option<Emission>,
+}
+
+/// Emission of a surface: the same radiance in every direction of the hemisphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance.
+    pub radiance: RgbParam,
+    /// Also from the back (glTF double-sided).
+    pub two_sided: bool,
+}
+
+/// How a spot's intensity falls from its beam to its cutoff.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpotFalloff {
+    /// Linear in the angle (Mitsuba).
+    LinearAngle,
+    /// `clamp((cos - cos_cutoff) / (cos_beam - cos_cutoff))` squared (KHR_lights_punctual).
+    SquaredCosine,
+}
+
+/// A light that is not a shape.
+#[derive(Clone, Debug)]
+pub enum LightDesc {
+    /// Isotropic point.
+    Point {
+        /// World space.
+        position: DVec3,
+        /// Radiant intensity, power per steradian.
+        intensity: Rgb,
+    },
+    /// Point with a cone.
+    Spot {
+        /// World space.
+        position: DVec3,
+        /// Where it points.
+        direction: DVec3,
+        /// Radiant intensity on the axis.
+        intensity: Rgb,
+        /// Half angle of full intensity, degrees.
+        beam: f64,
+        /// Half angle of zero intensity, degrees; > beam or equal for a hard edge.
+        cutoff: f64,
+        /// In between.
+        falloff: SpotFalloff,
+    },
+    /// Parallel light.
+    Directional {
+        /// The direction in which the light travels.
+        direction: DVec3,
+        /// Irradiance on a surface that faces it.
+        irradiance: Rgb,
+    },
+    /// The same radiance from every direction.
+    Constant {
+        /// Radiance.
+        radiance: Rgb,
+    },
+    /// An equirectangular picture: row 0 is +Y of the light's space; u = 0.5 + atan2(x, -z) / 2 pi, so that -Z is the centre column.
+    Environment {
+        /// Radiance.
+        image: Arc<Image>,
+        /// Multiplies it.
+        scale: Rgb,
+        /// Light space to world (rotation part used).
+        to_world: DAffine3,
+    },
+}
+
+/// Which side of the picture an angle of view spans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FovAxis {
+    /// Width.
+    X,
+    /// Height.
+    Y,
+    /// The shorter side.
+    Smaller,
+    /// The longer side.
+    Larger,
+    /// Corner to corner.
+    Diagonal,
+}
+
+/// A perspective camera that looks along its own -Z, with +X to the right and +Y up.
+#[derive(Clone, Debug)]
+pub struct CameraDesc {
+    /// Camera to world; scale is ignored.
+    pub to_world: DAffine3,
+    /// Full angle of view, degrees, in (0, 180).
+    pub fov: f64,
+    /// The side that `fov` spans.
+    pub fov_axis: FovAxis,
+    /// Radius of the lens; 0 = pinhole.
+    pub aperture_radius: f64,
+    /// Distance of the plane in focus, along -Z.
+    pub focus_distance: f64,
+}
+
+impl Default for CameraDesc {
+    fn default() -> Self {
+        Self {
+            to_world: DAffine3::IDENTITY,
+            fov: 45.0,
+            fov_axis: FovAxis::Y,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+        }
+    }
+}
+
+/// Pixel reconstruction filter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
+pub enum FilterDesc {
+    /// Constant within `radius` (0.5 = the pixel).
+    Box {
+        /// Half width in pixels.
+        radius: f32,
+    },
+    /// Linear to zero at `radius`.
+    Tent {
+        /// Half width in pixels.
+        radius: f32,
+    },
+    /// Gaussian minus its value at the radius (4 standard deviations).
+    Gaussian {
+        /// Standard deviation in pixels.
+        stddev: f32,
+    },
+    /// Four-term Blackman-Harris window.
+    BlackmanHarris {
+        /// Half width in pixels.
+        radius: f32,
+    },
+}
+
+/// What the scene file asks for; every field can be overridden.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderDefaults {
+    /// `path`, `light`, ...
+    pub integrator: Option<String>,
+    /// Samples per pixel.
+    pub spp: Option<u32>,
+    /// Width and height in pixels.
+    pub size: Option<(u32, u32)>,
+    /// Edges of the longest path; -1 unbounded.
+    pub max_depth: Option<i32>,
+    /// Depth from which Russian roulette may end a path.
+    pub rr_depth: Option<u32>,
+    /// Seed.
+    pub seed: Option<u64>,
+    /// Reconstruction filter.
+    pub filter: Option<FilterDesc>,
+}

@@ -1,0 +1,5 @@
+//! Linear Rec.709 colour.
+
+mod rgb;
+
+pub use rgb::Rgb;
