@@ -1,1 +1,50 @@
-//! integrator
+//! Integrators. One file and one line of [`IntegratorKind`] each.
+
+mod context;
+pub mod light;
+pub mod path;
+
+pub use context::{UnitContext, View};
+
+use serde::{Deserialize, Serialize};
+
+macro_rules! integrators {
+    ($($(#[$doc:meta])* $variant:ident = $name:literal,)*) => {
+        /// Which integrator renders.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+        pub enum IntegratorKind {
+            $($(#[$doc])* #[serde(rename = $name)] $variant,)*
+        }
+
+        impl IntegratorKind {
+            /// All of them, by name.
+            pub const ALL: &[(&str, Self)] = &[$(($name, Self::$variant)),*];
+
+            /// Its name on the command line and in scene files.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),* }
+            }
+        }
+    };
+}
+
+integrators! {
+    /// Unidirectional path tracing with next-event estimation and BSDF sampling, combined by multiple importance sampling.
+    Path = "path",
+    /// Light tracing: paths from the lights, each vertex connected to the camera.
+    Light = "light",
+}
+
+impl std::str::FromStr for IntegratorKind {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        let known = || Self::ALL.iter().map(|(n, _)| *n);
+        Self::ALL.iter().find(|(n, _)| *n == s).map(|(_, k)| *k).ok_or_else(|| {
+            let list = known().collect::<Vec<_>>().join(", ");
+            match crate::diagnostics::nearest(s, known()) {
+                Some(n) => format!("there is no integrator {s:?}; did you mean {n:?}? (known: {list})"),
+                None => format!("there is no integrator {s:?} (known: {list})"),
+            }
+        })
+    }
+}

@@ -1,1 +1,17 @@
-//! job
+//! A job: settings, passes, units, results and their merge. The same code runs in `lightfarm render` and on the farm.
+
+mod codec;
+mod local;
+mod merger;
+mod plan;
+mod run;
+mod settings;
+mod unit;
+
+pub use codec::DecodeError;
+pub use local::{LocalEvent, LocalOptions, LocalOutcome, render_local};
+pub use merger::{FoldError, Merger};
+pub use plan::{GroupRange, PassPlan, Planner};
+pub use run::{Stop, UnitError, run_unit};
+pub use settings::{Budget, RenderOptions, RenderSettings, SettingsError};
+pub use unit::{Unit, UnitKind, UnitResult};

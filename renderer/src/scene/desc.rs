@@ -193,6 +193,23 @@ pub enum FilterDesc {
     },
 }
 
+impl FilterDesc {
+    /// Checks that the filter has a usable width (more than 0, at most 8 pixels).
+    pub fn validate(&self) -> Result<(), String> {
+        let (what, v) = match *self {
+            Self::Box { radius } => ("radius of the box filter", radius),
+            Self::Tent { radius } => ("radius of the tent filter", radius),
+            Self::Gaussian { stddev } => ("standard deviation of the Gaussian filter", stddev),
+            Self::BlackmanHarris { radius } => ("radius of the Blackman-Harris filter", radius),
+        };
+        if v > 0.0 && v <= 8.0 {
+            Ok(())
+        } else {
+            Err(format!("the {what} is {v}; it must be above 0 and at most 8 pixels"))
+        }
+    }
+}
+
 /// What the scene file asks for; every field can be overridden.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderDefaults {

@@ -1,0 +1,137 @@
+use super::{Aov, Counters, GroupFilm};
+use serde::{Deserialize, Serialize};
+
+/// The error of an image, told by its replicate groups.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ErrorSummary {
+    /// `sqrt(mean over pixels and channels of variance / (I^2 + 0.01))`.
+    pub relative: f64,
+    /// Upper end of its one-sided 95 % interval (Student's t over the groups).
+    pub upper95: f64,
+    /// Mean of all pixels and channels.
+    pub mean: f64,
+    /// Standard error of that mean, from the groups.
+    pub mean_se: f64,
+    /// Replicate groups behind it.
+    pub groups: u32,
+}
+
+/// The image that groups merge to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MergedImage {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Radiance, row by row.
+    pub mean: Vec<[f32; 3]>,
+    /// Standard error of `mean`; NaN where fewer than two groups have samples.
+    pub std_error: Vec<[f32; 3]>,
+    /// Samples of each pixel over all groups (light tracing: light paths per pixel).
+    pub samples: Vec<f32>,
+    /// Averages of the auxiliary values; empty when the integrator has none.
+    pub aovs: Vec<Aov>,
+    /// The error of the whole; `None` with fewer than two groups.
+    pub error: Option<ErrorSummary>,
+    /// Sum over all units.
+    pub counters: Counters,
+}
+
+impl MergedImage {
+    /// Merges groups: the mean weighted by samples; its variance from the scatter between groups,
+    /// `sum n_g (I_g - I)^2 / ((G - 1) sum n_g)`, which is unbiased for unequal `n_g` too.
+    pub fn from_groups(width: u32, height: u32, groups: &[GroupFilm], aovs: Vec<Aov>, counters: Counters) -> Self {
+        let pixels = width as usize * height as usize;
+        let mut image = Self {
+            width,
+            height,
+            mean: Vec::with_capacity(pixels),
+            std_error: Vec::with_capacity(pixels),
+            samples: Vec::with_capacity(pixels),
+            aovs,
+            error: None,
+            counters,
+        };
+        let mut scatter = GroupScatter::new(groups.len());
+        let mut values = Vec::with_capacity(groups.len());
+        for i in 0..pixels {
+            values.clear();
+            values.extend(groups.iter().enumerate().map(|(g, f)| (g, f.pixel(i))).filter(|(_, (_, n))| *n > 0.0));
+            image.push_pixel(&values, &mut scatter);
+        }
+        image.error = scatter.summary(pixels);
+        image
+    }
+
+    fn push_pixel(&mut self, values: &[(usize, ([f64; 3], f64))], scatter: &mut GroupScatter) {
+        let n: f64 = values.iter().map(|v| v.1.1).sum();
+        self.samples.push(n as f32);
+        if values.is_empty() {
+            self.mean.push([0.0; 3]);
+            self.std_error.push([f32::NAN; 3]);
+            return;
+        }
+        let mean: [f64; 3] = std::array::from_fn(|c| values.iter().map(|v| v.1.0[c] * v.1.1).sum::<f64>() / n);
+        let var: [f64; 3] = std::array::from_fn(|c| {
+            let s: f64 = values.iter().map(|v| v.1.1 * (v.1.0[c] - mean[c]) * (v.1.0[c] - mean[c])).sum();
+            s / ((values.len() as f64 - 1.0) * n)
+        });
+        scatter.add(values, &mean, n);
+        self.mean.push(mean.map(|v| v as f32));
+        self.std_error.push(var.map(|v| if values.len() < 2 { f32::NAN } else { v.sqrt() as f32 }));
+    }
+}
+
+/// Per group: its share of the relative squared error and its image mean.
+struct GroupScatter {
+    squared: Vec<f64>,
+    mean: Vec<f64>,
+    weight: Vec<f64>,
+}
+
+impl GroupScatter {
+    fn new(groups: usize) -> Self {
+        Self { squared: vec![0.0; groups], mean: vec![0.0; groups], weight: vec![0.0; groups] }
+    }
+
+    fn add(&mut self, values: &[(usize, ([f64; 3], f64))], mean: &[f64; 3], n: f64) {
+        let g = values.len() as f64;
+        for (group, (v, n_g)) in values {
+            for c in 0..3 {
+                let d = v[c] - mean[c];
+                if g > 1.0 {
+                    self.squared[*group] += n_g * d * d * g / ((g - 1.0) * n * (mean[c] * mean[c] + 0.01));
+                }
+                self.mean[*group] += v[c];
+            }
+            self.weight[*group] += n_g;
+        }
+    }
+
+    /// The relative squared error is the mean over groups of `squared`; the groups' spread gives its interval.
+    fn summary(&self, pixels: usize) -> Option<ErrorSummary> {
+        let used: Vec<usize> = (0..self.weight.len()).filter(|&g| self.weight[g] > 0.0).collect();
+        let count = used.len() as f64;
+        if used.len() < 2 {
+            return None;
+        }
+        let terms = 3.0 * pixels as f64;
+        let moments = |values: &[f64]| {
+            let mean = used.iter().map(|&g| values[g]).sum::<f64>() / count / terms;
+            let spread: f64 = used.iter().map(|&g| (values[g] / terms - mean) * (values[g] / terms - mean)).sum();
+            (mean, (spread / (count - 1.0) / count).sqrt())
+        };
+        let (squared, squared_se) = moments(&self.squared);
+        let (mean, mean_se) = moments(&self.mean);
+        let upper = squared + t95_one_sided(used.len() - 1) * squared_se;
+        Some(ErrorSummary { relative: squared.sqrt(), upper95: upper.sqrt(), mean, mean_se, groups: used.len() as u32 })
+    }
+}
+
+/// 95 % quantile of Student's t distribution.
+fn t95_one_sided(dof: usize) -> f64 {
+    const TABLE: [f64; 15] =
+        [6.314, 2.920, 2.353, 2.132, 2.015, 1.943, 1.895, 1.860, 1.833, 1.812, 1.796, 1.782, 1.771, 1.761, 1.753];
+    TABLE.get(dof.saturating_sub(1)).copied().unwrap_or(1.645 + 1.5 / dof as f64)
+}

@@ -1,0 +1,79 @@
+use crate::spectrum::Rgb;
+use serde::{Deserialize, Serialize};
+
+/// A rectangle of pixels, `x0 <= x < x1`, `y0 <= y < y1`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rect {
+    /// Left.
+    pub x0: u32,
+    /// Top.
+    pub y0: u32,
+    /// Right, exclusive.
+    pub x1: u32,
+    /// Bottom, exclusive.
+    pub y1: u32,
+}
+
+impl Rect {
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.x1 - self.x0
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.y1 - self.y0
+    }
+
+    /// Number of pixels.
+    pub fn area(&self) -> usize {
+        self.width() as usize * self.height() as usize
+    }
+
+    /// The pixels, row by row.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let r = *self;
+        (r.y0..r.y1).flat_map(move |y| (r.x0..r.x1).map(move |x| (x, y)))
+    }
+}
+
+/// Sums of what the first hit is; for denoisers and compositing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Aov {
+    /// Albedo of the surface.
+    pub albedo: [f32; 3],
+    /// World-space shading normal.
+    pub normal: [f32; 3],
+    /// Distance from the camera.
+    pub depth: f32,
+    /// Samples that hit a surface (depth averages over these).
+    pub hits: f32,
+}
+
+impl Aov {
+    /// Adds another sum.
+    #[inline]
+    pub fn add(&mut self, o: &Self) {
+        for i in 0..3 {
+            self.albedo[i] += o.albedo[i];
+            self.normal[i] += o.normal[i];
+        }
+        self.depth += o.depth;
+        self.hits += o.hits;
+    }
+}
+
+/// Unnormalised sums over the samples of one tile.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TileSums {
+    /// The tile.
+    pub rect: Rect,
+    /// Samples per pixel that were taken.
+    pub samples: u32,
+    /// Sums of radiance, row by row; rounded once from f64.
+    pub sums: Vec<Rgb>,
+    /// Sums of the auxiliary values, row by row; empty for all replicates but the first.
+    pub aovs: Vec<Aov>,
+}

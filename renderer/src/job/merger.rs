@@ -1,0 +1,216 @@
+use super::plan::{PassPlan, Planner};
+use super::settings::RenderSettings;
+use super::unit::{UnitKind, UnitResult};
+use crate::film::{Aov, Counters, GroupFilm, MergedImage};
+
+/// A result that can't be folded.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FoldError {
+    /// Not the unit whose turn it is.
+    #[error("unit {got} can't be folded now; the next is unit {want} of {count}")]
+    Order {
+        /// The unit offered.
+        got: u32,
+        /// The unit whose turn it is.
+        want: u32,
+        /// Units of the pass.
+        count: u32,
+    },
+    /// The result is not that of the unit it claims to be.
+    #[error("the result does not fit unit {0} of the plan")]
+    Mismatch(u32),
+}
+
+/// Folds unit results in the order of their numbers: sums of floats depend on their order, so there is just this one.
+#[derive(Clone, Debug)]
+pub struct Merger {
+    settings: RenderSettings,
+    planner: Planner,
+    plan: PassPlan,
+    next: u32,
+    done_spp: u32,
+    groups: Vec<GroupFilm>,
+    aovs: Vec<Aov>,
+    light_sums: Vec<f64>,
+    counters: Counters,
+    checkpoints_met: u32,
+    finished: bool,
+}
+
+impl Merger {
+    /// An empty film and the first pass.
+    pub fn new(settings: RenderSettings) -> Self {
+        let planner = Planner::new(settings.clone());
+        let plan = planner.first();
+        let groups = vec![GroupFilm::Empty; settings.replicates as usize];
+        Self {
+            settings,
+            planner,
+            plan,
+            next: 0,
+            done_spp: 0,
+            groups,
+            aovs: Vec::new(),
+            light_sums: Vec::new(),
+            counters: Counters::default(),
+            checkpoints_met: 0,
+            finished: false,
+        }
+    }
+
+    /// The job's settings.
+    pub fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// The pass under way.
+    pub fn plan(&self) -> &PassPlan {
+        &self.plan
+    }
+
+    /// The unit whose turn it is; equals the plan's unit count when the pass is complete.
+    pub fn next_unit(&self) -> u32 {
+        self.next
+    }
+
+    /// Whether every unit of the pass is folded.
+    pub fn pass_complete(&self) -> bool {
+        self.next >= self.plan.unit_count()
+    }
+
+    /// Folds the next unit's result.
+    pub fn fold(&mut self, unit: u32, result: &UnitResult) -> Result<(), FoldError> {
+        if unit != self.next {
+            return Err(FoldError::Order { got: unit, want: self.next, count: self.plan.unit_count() });
+        }
+        self.fold_any(unit, result)?;
+        self.next += 1;
+        if self.plan.last
+            && let Some(group) = self.plan.ends_group(unit)
+        {
+            self.groups[group as usize].close(self.settings.width as usize * self.settings.height as usize);
+        }
+        Ok(())
+    }
+
+    /// Folds a later unit of the pass although earlier ones are missing: only to save what an interrupted job has finished.
+    /// Each unit at most once; no [`Merger::fold`] or [`Merger::advance`] afterwards.
+    pub fn fold_interrupted(&mut self, unit: u32, result: &UnitResult) -> Result<(), FoldError> {
+        self.fold_any(unit, result)
+    }
+
+    fn fold_any(&mut self, id: u32, result: &UnitResult) -> Result<(), FoldError> {
+        let (w, h) = (self.settings.width, self.settings.height);
+        let unit = self.plan.unit(id).ok_or(FoldError::Mismatch(id))?;
+        let group = &mut self.groups[unit.replicate as usize];
+        match (&unit.kind, &result.tile, &result.splats) {
+            (UnitKind::Tile { rect, start, end }, Some(tile), None)
+                if tile.rect == *rect && tile.samples == end - start && tile.sums.len() == rect.area() =>
+            {
+                if tile.aovs.len() != if unit.replicate == 0 { rect.area() } else { 0 } {
+                    return Err(FoldError::Mismatch(id));
+                }
+                group.add_tile(w, h, tile);
+                self.add_aovs(tile);
+            }
+            (UnitKind::Paths { start, end }, None, Some(splats))
+                if splats.size() == (w, h) && result.paths == end - start =>
+            {
+                group.add_splats(splats, result.paths);
+                self.light_sums.resize(self.light_sums.len().max(result.light_sums.len()), 0.0);
+                self.light_sums.iter_mut().zip(&result.light_sums).for_each(|(to, from)| *to += from);
+            }
+            _ => return Err(FoldError::Mismatch(id)),
+        }
+        self.counters.add(&result.counters);
+        Ok(())
+    }
+
+    fn add_aovs(&mut self, tile: &crate::film::TileSums) {
+        if tile.aovs.is_empty() {
+            return;
+        }
+        let width = self.settings.width as usize;
+        if self.aovs.is_empty() {
+            self.aovs = vec![Aov::default(); width * self.settings.height as usize];
+        }
+        for ((x, y), aov) in tile.rect.pixels().zip(&tile.aovs) {
+            self.aovs[y as usize * width + x as usize].add(aov);
+        }
+    }
+
+    /// After the last unit of a pass: plans the next, or ends the job. `time_up` says that the wall time is used up.
+    pub fn advance(&mut self, time_up: bool) -> Option<&PassPlan> {
+        if self.finished {
+            return None;
+        }
+        if !self.pass_complete() {
+            return Some(&self.plan);
+        }
+        self.done_spp += self.plan.spp() as u32;
+        let ends = time_up || self.plan.last || self.target_met();
+        let next =
+            if ends { None } else { self.planner.next(self.plan.pass + 1, self.done_spp, self.learned_weights()) };
+        let Some(plan) = next else {
+            self.finished = true;
+            return None;
+        };
+        self.plan = plan;
+        self.next = 0;
+        Some(&self.plan)
+    }
+
+    /// A target is met when the error's upper bound is below it at two checkpoints (ends of passes) in a row.
+    fn target_met(&mut self) -> bool {
+        let Some(target) = self.settings.budget.target_error else { return false };
+        let met = self.image().error.is_some_and(|e| e.upper95 <= target);
+        self.checkpoints_met = if met { self.checkpoints_met + 1 } else { 0 };
+        self.checkpoints_met >= 2
+    }
+
+    /// Selection weights of the lights: the square root of the power that reached the film would be best for equal variances;
+    /// the contribution itself is the safer choice for few samples. Lights that gave nothing keep a share (see `LightSelector`).
+    fn learned_weights(&self) -> Vec<f32> {
+        let total: f64 = self.light_sums.iter().sum();
+        if self.light_sums.len() < 2 || !(total > 0.0) {
+            return Vec::new();
+        }
+        self.light_sums.iter().map(|s| (s / total) as f32).collect()
+    }
+
+    /// Samples per pixel folded in completed passes.
+    pub fn done_spp(&self) -> u32 {
+        self.done_spp
+    }
+
+    /// Share of the job's samples that are folded when the budget is in samples, else of the pass; 1 at the end.
+    pub fn fraction(&self) -> f64 {
+        let in_pass = f64::from(self.next) / f64::from(self.plan.unit_count().max(1));
+        match self.settings.budget.spp {
+            _ if self.finished => 1.0,
+            Some(n) => (f64::from(self.done_spp) + self.plan.spp() as f64 * in_pass) / f64::from(n),
+            None => in_pass,
+        }
+    }
+
+    /// Whether the job has ended.
+    pub fn finished(&self) -> bool {
+        self.finished
+    }
+
+    /// Sum of the folded units' counters.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// The image so far.
+    pub fn image(&self) -> MergedImage {
+        MergedImage::from_groups(
+            self.settings.width,
+            self.settings.height,
+            &self.groups,
+            self.aovs.clone(),
+            self.counters,
+        )
+    }
+}

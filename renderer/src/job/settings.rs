@@ -1,0 +1,137 @@
+use crate::integrator::IntegratorKind;
+use crate::scene::desc::{FilterDesc, RenderDefaults};
+use serde::{Deserialize, Serialize};
+
+/// When a job is done: at whichever of these comes first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// Samples per pixel (light paths per pixel), all groups together.
+    pub spp: Option<u32>,
+    /// Wall time in seconds; the job ends with the pass in which it runs out.
+    pub time_s: Option<f64>,
+    /// Relative error whose upper 95 % bound must be met at two checkpoints in a row.
+    pub target_error: Option<f64>,
+}
+
+/// Everything that decides a job's pixels, beside the scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RenderSettings {
+    /// The integrator.
+    pub integrator: IntegratorKind,
+    /// When to stop.
+    pub budget: Budget,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Reconstruction filter.
+    pub filter: FilterDesc,
+    /// Edges of the longest path; `None` = unbounded.
+    pub max_depth: Option<u32>,
+    /// Edges from which Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// Seed.
+    pub seed: u64,
+    /// Independent replicate groups.
+    pub replicates: u32,
+}
+
+/// What the command line says; `None` leaves it to the scene file or the default.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderOptions {
+    /// `--integrator`
+    pub integrator: Option<IntegratorKind>,
+    /// `--spp`
+    pub spp: Option<u32>,
+    /// `--time`, seconds
+    pub time_s: Option<f64>,
+    /// `--target-error`
+    pub target_error: Option<f64>,
+    /// `--size`
+    pub size: Option<(u32, u32)>,
+    /// `--max-depth`
+    pub max_depth: Option<i32>,
+    /// `--seed`
+    pub seed: Option<u64>,
+}
+
+/// Settings that can't be rendered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct SettingsError(pub String);
+
+/// The largest film, in pixels: 2^28 (16384 x 16384).
+pub const MAX_PIXELS: u64 = 1 << 28;
+/// Replicate groups of a job that has samples for them.
+const REPLICATES: u32 = 8;
+/// Replicate groups of an integrator that splats: its samples gain nothing from long sequences.
+const SPLAT_REPLICATES: u32 = 16;
+
+impl RenderSettings {
+    /// Command line over scene file over defaults.
+    pub fn resolve(options: &RenderOptions, scene: &RenderDefaults) -> Result<Self, SettingsError> {
+        let from_scene = || scene.integrator.as_deref().map(str::parse::<IntegratorKind>);
+        let integrator = match options.integrator {
+            Some(k) => k,
+            None => from_scene().transpose().map_err(SettingsError)?.unwrap_or(IntegratorKind::Path),
+        };
+        let spp = match (options.spp, options.time_s, options.target_error) {
+            (None, None, None) => Some(scene.spp.unwrap_or(64)),
+            (spp, _, _) => spp,
+        };
+        let (width, height) = options.size.or(scene.size).unwrap_or((768, 432));
+        let depth = options.max_depth.or(scene.max_depth).unwrap_or(-1);
+        let groups = if integrator == IntegratorKind::Light { SPLAT_REPLICATES } else { REPLICATES };
+        let settings = Self {
+            integrator,
+            budget: Budget { spp, time_s: options.time_s, target_error: options.target_error },
+            width,
+            height,
+            filter: scene.filter.unwrap_or(FilterDesc::Gaussian { stddev: 0.5 }),
+            max_depth: if depth == -1 { None } else { Some(u32::try_from(depth).map_err(|_| bad_depth(depth))?) },
+            rr_depth: scene.rr_depth.unwrap_or(5),
+            seed: options.seed.or(scene.seed).unwrap_or(0),
+            replicates: spp.map_or(groups, |n| groups.min(n.max(1))),
+        };
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    /// Checks what came over the wire or from a user.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        let fail = |m: String| Err(SettingsError(m));
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        if pixels == 0 || pixels > MAX_PIXELS || self.width > 1 << 16 || self.height > 1 << 16 {
+            return fail(format!(
+                "a picture of {} x {} pixels can't be rendered; sides go from 1 to 65536, the area to {MAX_PIXELS}",
+                self.width, self.height
+            ));
+        }
+        let b = &self.budget;
+        if b.spp.is_none() && b.time_s.is_none() && b.target_error.is_none() {
+            return fail("nothing says when the job is done; give --spp, --time or --target-error".into());
+        }
+        if b.spp == Some(0) || b.spp.is_some_and(|n| n > 1 << 24) {
+            return fail(format!("--spp {} is out of range; it goes from 1 to {}", b.spp.unwrap_or(0), 1 << 24));
+        }
+        if b.time_s.is_some_and(|t| !(t > 0.0 && t.is_finite())) {
+            return fail("--time must be a positive number of seconds".into());
+        }
+        if b.target_error.is_some_and(|t| !(t > 0.0 && t.is_finite())) {
+            return fail("--target-error must be a positive number, such as 0.02".into());
+        }
+        if self.replicates == 0 || self.replicates > 64 {
+            return fail(format!("{} replicate groups are out of range; they go from 1 to 64", self.replicates));
+        }
+        if let Err(m) = self.filter.validate() {
+            return fail(m);
+        }
+        Ok(())
+    }
+}
+
+fn bad_depth(depth: i32) -> SettingsError {
+    SettingsError(format!("--max-depth {depth} is out of range; it counts edges from 0, and -1 means unbounded"))
+}
