@@ -1,5 +1,7 @@
 //! Importers: glTF, lightfarm TOML and Mitsuba XML to a [`SceneDesc`].
 
+pub mod image;
+
 use super::bundle::FileSource;
 use super::desc::SceneDesc;
 use crate::diagnostics::{Diagnostics, SceneError};
