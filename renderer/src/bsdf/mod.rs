@@ -1,8 +1,27 @@
-//! BSDFs. The contract: `wo` points to the previous vertex, `wi` to the next, both unit, outward, in the shading frame (z = ns).
-//! `eval` is without the cosine; `pdf` is per solid angle and 0 for delta lobes.
+//! BSDFs. The contract, which every file here keeps:
+//!
+//! * `wo` points to the previous vertex of the walk, `wi` to the next; both unit, outward, in the shading frame (z = ns).
+//! * `f` is without the cosine. `pdf` is per solid angle of `wi`. Delta lobes are in neither: only `sample` returns them, with
+//!   `pdf` the probability of the lobe and `f` such that `f |cos(wi)| / pdf` is the weight of the path.
+//! * What `sample` returns for a lobe that is not delta equals `eval_pdf` of its direction.
+//! * [`Transport`] says which quantity flows along `wo`: radiance is scaled by the squared ratio of the indices where it
+//!   refracts, importance is not. `f_importance(wo, wi) = f_radiance(wi, wo)`.
+//! * The correction for shading normals in importance transport is applied in `path/`, nowhere else.
+//!
+//! A new BSDF is one file (the type, `resolve`, [`Model`] with its examples) and one entry of the list below. The entry's fields
+//! are what a scene describes; the type is what they come to at one point. The statistical tests draw from the same list.
 
+mod lambert;
+mod resolve;
+mod shading;
+
+pub use lambert::Lambert;
+pub use shading::{DirectionSample, MAX_NESTING, ShadingPoint, first_bad_nesting};
+
+use crate::math::{Vec2, Vec3};
 use crate::spectrum::Rgb;
 use crate::texture::{FloatParam, RgbParam, TextureId};
+use resolve::At;
 
 /// Index of a material in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,65 +47,240 @@ pub struct Roughness {
     pub alpha_v: FloatParam,
 }
 
-/// A BSDF as the scene describes it, parameters possibly textured.
+/// What a path carries towards `wo`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Walks from the camera: radiance flows from `wi` to `wo`.
+    Radiance,
+    /// Walks from a light: importance flows from `wi` to `wo`.
+    Importance,
+}
+
+/// Which part of a BSDF a direction was drawn from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lobe {
+    /// A single direction: no density, no connections.
+    pub delta: bool,
+    /// To the other side of the surface.
+    pub transmission: bool,
+    /// Diffuse rather than glossy.
+    pub diffuse: bool,
+}
+
+impl Lobe {
+    /// Diffuse reflection.
+    pub const DIFFUSE: Self = Self { delta: false, transmission: false, diffuse: true };
+
+    /// Glossy or mirror-like scattering.
+    #[inline]
+    pub const fn specular(delta: bool, transmission: bool) -> Self {
+        Self { delta, transmission, diffuse: false }
+    }
+}
+
+/// A direction drawn from a BSDF, in the shading frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Material {
-    /// Ideal diffuse reflection on the front side, black from behind.
-    Lambert {
-        /// Albedo in [0, 1].
-        reflectance: RgbParam,
-    },
-    /// Metal; black from behind.
-    Conductor {
-        /// Real index of refraction, relative to the outside.
-        eta: Rgb,
-        /// Absorption index, relative to the outside.
-        k: Rgb,
-        /// Multiplies the Fresnel reflectance.
-        reflectance: RgbParam,
-        /// `None` = a smooth mirror.
-        roughness: Option<Roughness>,
-    },
-    /// Glass, water: reflects and refracts.
-    Dielectric {
-        /// Index inside (below the surface) over index outside.
-        eta: f32,
-        /// Multiplies reflection.
-        reflectance: RgbParam,
-        /// Multiplies transmission.
-        transmittance: RgbParam,
-        /// `None` = smooth.
-        roughness: Option<Roughness>,
-    },
-    /// glTF metallic-roughness with KHR_materials_ior and KHR_materials_transmission; both sides.
-    Gltf {
-        /// Base colour.
-        base_color: RgbParam,
-        /// 0 dielectric, 1 metal.
-        metallic: FloatParam,
-        /// Perceptual roughness; alpha is its square.
-        roughness: FloatParam,
-        /// Index of refraction of the dielectric part.
-        ior: f32,
-        /// Share of transmission in the dielectric's base layer.
-        transmission: FloatParam,
-        /// Thin-walled: transmission does not refract (no KHR_materials_volume thickness).
-        thin: bool,
-    },
-    /// Another material on each side; seen from behind, the back material's front is seen.
-    TwoSided {
-        /// Where `dot(wo, ns) > 0`.
-        front: MaterialId,
-        /// On the other side.
-        back: MaterialId,
-    },
-    /// Bends the shading normal by a tangent-space normal map.
-    NormalMap {
-        /// The bent material; not itself a normal map.
-        inner: MaterialId,
-        /// RGB in [0, 1] maps to xyz in [-1, 1].
-        texture: TextureId,
-        /// Multiplies x and y.
-        scale: f32,
-    },
+pub struct BsdfSample {
+    /// Where the path goes on.
+    pub wi: Vec3,
+    /// Value without the cosine.
+    pub f: Rgb,
+    /// Density per solid angle; for a delta lobe its probability.
+    pub pdf: f32,
+    /// What was drawn.
+    pub lobe: Lobe,
+    /// Index of refraction on the side of `wi` over that on the side of `wo`; 1 for reflection.
+    pub eta: f32,
+}
+
+/// What every BSDF can do, at one point of a surface, in the shading frame.
+pub trait Model: Copy {
+    /// Value and density of the lobes that are not delta.
+    fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, f32);
+
+    /// Draws `wi` given `wo`: `uc` chooses the lobe, `u` the direction. `None` absorbs the path.
+    fn sample(&self, wo: Vec3, uc: f32, u: Vec2, mode: Transport) -> Option<BsdfSample>;
+
+    /// Whether nothing but delta lobes is there: no light can be connected to such a point.
+    fn is_delta_only(&self) -> bool {
+        false
+    }
+
+    /// Whether anything passes to the other side.
+    fn transmits(&self) -> bool {
+        false
+    }
+
+    /// Rough reflectance for the albedo image, in [0, 1].
+    fn albedo(&self) -> Rgb;
+
+    /// Instances that the statistical tests examine, extreme parameters among them.
+    fn examples() -> Vec<(&'static str, Self)>;
+}
+
+/// A named instance of a BSDF, for tests.
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// Type and parameters in words.
+    pub name: String,
+    /// The instance.
+    pub bsdf: Bsdf,
+}
+
+macro_rules! bsdfs {
+    (
+        models { $($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ty,)* })* }
+        wrappers { $($wrappers:tt)* }
+    ) => {
+        bsdfs!(@material [$($wrappers)*] $($(#[$doc])* $name { $($(#[$field_doc])* $field: $ty,)* },)*);
+
+        /// A BSDF with all its parameters known.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Bsdf {
+            $($(#[$doc])* $name($name),)*
+        }
+
+        $(impl From<$name> for Bsdf {
+            fn from(model: $name) -> Self { Self::$name(model) }
+        })*
+
+        impl Material {
+            /// The BSDF at one point; `None` for materials that only wrap others.
+            fn resolve(&self, at: &At) -> Option<Bsdf> {
+                match *self {
+                    $(Self::$name { $($field),* } => Some(Bsdf::$name($name::resolve(at, $($field),*))),)*
+                    _ => None,
+                }
+            }
+        }
+
+        impl Bsdf {
+            /// Value without cosine and density per solid angle of the lobes that are not delta.
+            #[inline]
+            pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> (Rgb, f32) {
+                match self { $(Self::$name(m) => m.eval_pdf(wo, wi, mode),)* }
+            }
+
+            /// Draws `wi` given `wo`: `uc` chooses the lobe, `u` the direction. `None` absorbs the path.
+            #[inline]
+            pub fn sample(&self, wo: Vec3, uc: f32, u: Vec2, mode: Transport) -> Option<BsdfSample> {
+                match self { $(Self::$name(m) => m.sample(wo, uc, u, mode),)* }
+            }
+
+            /// Whether nothing but delta lobes is there: no light can be connected to such a point.
+            #[inline]
+            pub fn is_delta_only(&self) -> bool {
+                match self { $(Self::$name(m) => m.is_delta_only(),)* }
+            }
+
+            /// Whether anything passes to the other side.
+            #[inline]
+            pub fn transmits(&self) -> bool {
+                match self { $(Self::$name(m) => m.transmits(),)* }
+            }
+
+            /// Rough reflectance for the albedo image, in [0, 1].
+            pub fn albedo(&self) -> Rgb {
+                match self { $(Self::$name(m) => m.albedo(),)* }
+            }
+        }
+
+        /// The instances of every BSDF in the list that the statistical tests examine.
+        pub fn roster() -> Vec<Example> {
+            let mut all = Vec::new();
+            $(all.extend($name::examples().into_iter().map(|(label, model)| {
+                Example { name: format!("{}, {label}", stringify!($name)), bsdf: model.into() }
+            }));)*
+            all
+        }
+    };
+    (@material [$($wrappers:tt)*] $($models:tt)*) => {
+        /// A material as the scene describes it, parameters possibly textured.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Material { $($models)* $($wrappers)* }
+    };
+}
+
+bsdfs! {
+    models {
+        /// Ideal diffuse reflection on the front side, black from behind.
+        Lambert {
+            /// Albedo in [0, 1].
+            reflectance: RgbParam,
+        }
+    }
+    wrappers {
+        /// Metal; black from behind.
+        Conductor {
+            /// Real index of refraction, relative to the outside.
+            eta: Rgb,
+            /// Absorption index, relative to the outside.
+            k: Rgb,
+            /// Multiplies the Fresnel reflectance.
+            reflectance: RgbParam,
+            /// `None` = a smooth mirror.
+            roughness: Option<Roughness>,
+        },
+        /// Glass, water: reflects and refracts.
+        Dielectric {
+            /// Index inside (below the surface) over index outside.
+            eta: f32,
+            /// Multiplies reflection.
+            reflectance: RgbParam,
+            /// Multiplies transmission.
+            transmittance: RgbParam,
+            /// `None` = smooth.
+            roughness: Option<Roughness>,
+        },
+        /// glTF metallic-roughness with KHR_materials_ior and KHR_materials_transmission; both sides.
+        Gltf {
+            /// Base colour.
+            base_color: RgbParam,
+            /// 0 dielectric, 1 metal.
+            metallic: FloatParam,
+            /// Perceptual roughness; alpha is its square.
+            roughness: FloatParam,
+            /// Index of refraction of the dielectric part.
+            ior: f32,
+            /// Share of transmission in the dielectric's base layer.
+            transmission: FloatParam,
+            /// Thin-walled: transmission does not refract (no KHR_materials_volume thickness).
+            thin: bool,
+        },
+        /// Another material on each side; seen from behind, the back material's front is seen.
+        TwoSided {
+            /// Where `dot(wo, ns) > 0`.
+            front: MaterialId,
+            /// On the other side.
+            back: MaterialId,
+        },
+        /// Bends the shading normal by a tangent-space normal map.
+        NormalMap {
+            /// The bent material; not itself a normal map.
+            inner: MaterialId,
+            /// RGB in [0, 1] maps to xyz in [-1, 1].
+            texture: TextureId,
+            /// Multiplies x and y.
+            scale: f32,
+            /// Whether the map's y axis turns round where the texture coordinates are mirrored (glTF); otherwise it is always
+            /// the normal times the tangent (Mitsuba).
+            mirrors_with_uv: bool,
+        },
+    }
+}
+
+const _: () = assert!(std::mem::size_of::<Bsdf>() <= 96, "a Bsdf is copied at every hit");
+
+impl Bsdf {
+    /// Value without cosine of the lobes that are not delta.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, mode: Transport) -> Rgb {
+        self.eval_pdf(wo, wi, mode).0
+    }
+
+    /// Density per solid angle of `wi` given `wo`, of the lobes that are not delta.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3, mode: Transport) -> f32 {
+        self.eval_pdf(wo, wi, mode).1
+    }
 }

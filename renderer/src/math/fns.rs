@@ -39,6 +39,8 @@ pinned! {
     ln_1p, ln_1p64 = log1pf, log1p;
     /// `exp(x) - 1`.
     exp_m1, exp_m164 = expm1f, expm1;
+    /// Error function, `2 / sqrt(pi)` times the integral of `exp(-t^2)` from 0 to `x`.
+    erf, erf64 = erff, erf;
 }
 
 /// Arc cosine; the argument is clamped to [-1, 1].

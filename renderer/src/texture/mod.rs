@@ -1,5 +1,7 @@
 //! Textures: anything that gives a colour or a number at texture coordinates.
 
+mod eval;
+
 use crate::math::Vec2;
 use crate::spectrum::Rgb;
 use std::sync::Arc;
