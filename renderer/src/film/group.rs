@@ -15,8 +15,8 @@ pub enum GroupFilm {
         samples: Vec<u32>,
         /// Sums of splats.
         splats: Vec<[f64; 3]>,
-        /// Light paths behind `splats`, over the number of pixels: what a splat sum is divided by.
-        splat_weight: f64,
+        /// Light paths behind `splats`: what a splat sum is divided by.
+        paths: u64,
     },
     /// Complete.
     Closed {
@@ -30,7 +30,7 @@ pub enum GroupFilm {
 impl GroupFilm {
     fn open(&mut self, pixels: usize, tiles: bool, splat: bool) {
         if matches!(self, Self::Empty) {
-            *self = Self::Open { sums: Vec::new(), samples: Vec::new(), splats: Vec::new(), splat_weight: 0.0 };
+            *self = Self::Open { sums: Vec::new(), samples: Vec::new(), splats: Vec::new(), paths: 0 };
         }
         if let Self::Open { sums, samples, splats, .. } = self {
             if tiles && sums.is_empty() {
@@ -56,19 +56,19 @@ impl GroupFilm {
         }
     }
 
-    /// Adds splats made by `paths` light paths over the whole film.
+    /// Adds splats made by `paths` light paths over the whole film: the image is their sum over `paths`.
     pub fn add_splats(&mut self, layer: &SplatSums, paths: u64) {
         let (width, height) = layer.size();
         let pixels = width as usize * height as usize;
         self.open(pixels, false, true);
-        let Self::Open { splats, splat_weight, .. } = self else { return };
+        let Self::Open { splats, paths: total, .. } = self else { return };
         for (x, y, v) in layer.pixels() {
             let to = &mut splats[y as usize * width as usize + x as usize];
             for c in 0..3 {
                 to[c] += v[c];
             }
         }
-        *splat_weight += paths as f64 / pixels as f64;
+        *total += paths;
     }
 
     /// The mean of pixel `i` and its weight (samples, or light paths per pixel); weight 0 where nothing was sampled.
@@ -76,19 +76,19 @@ impl GroupFilm {
         match self {
             Self::Empty => ([0.0; 3], 0.0),
             Self::Closed { mean, weight } => (mean[i].map(f64::from), *weight),
-            Self::Open { sums, samples, splats, splat_weight } => {
+            Self::Open { sums, samples, splats, paths } => {
                 let n = samples.get(i).copied().map_or(0.0, f64::from);
                 let mut mean = [0.0; 3];
                 if n > 0.0 {
                     mean = sums[i].map(|v| v / n);
                 }
-                if *splat_weight > 0.0 {
+                if *paths > 0 {
                     for c in 0..3 {
-                        mean[c] += splats[i][c] / splat_weight;
+                        mean[c] += splats[i][c] / *paths as f64;
                     }
                 }
-                // Tiles and splats of one job sample the same image together; the tile's count leads where there are tiles.
-                (mean, if samples.is_empty() { *splat_weight } else { n })
+                // Where tiles and splats sample the same image together, the tile's count leads.
+                (mean, if samples.is_empty() { *paths as f64 / splats.len() as f64 } else { n })
             }
         }
     }
@@ -100,5 +100,62 @@ impl GroupFilm {
             let mean = (0..pixels).map(|i| self.pixel(i).0.map(|v| v as f32)).collect();
             *self = Self::Closed { mean, weight };
         }
+    }
+}
+
+/// Groups as bytes, for a merge that goes on later (`job::Merger::save`).
+impl GroupFilm {
+    /// Appends the group.
+    pub fn save(&self, out: &mut Vec<u8>) {
+        fn array<T: bytemuck::NoUninit>(out: &mut Vec<u8>, v: &[T]) {
+            out.extend((v.len() as u64).to_le_bytes());
+            out.extend_from_slice(bytemuck::cast_slice(v));
+        }
+        match self {
+            Self::Empty => out.push(0),
+            Self::Open { sums, samples, splats, paths } => {
+                out.push(1);
+                array(out, sums);
+                array(out, samples);
+                array(out, splats);
+                out.extend(paths.to_le_bytes());
+            }
+            Self::Closed { mean, weight } => {
+                out.push(2);
+                array(out, mean);
+                out.extend(weight.to_le_bytes());
+            }
+        }
+    }
+
+    /// Takes a group of a film of `pixels` pixels off the front of `bytes`; `None` when they are not one.
+    pub fn load(bytes: &mut &[u8], pixels: usize) -> Option<Self> {
+        fn take<'a>(bytes: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
+            let (head, tail) = bytes.split_at_checked(n)?;
+            *bytes = tail;
+            Some(head)
+        }
+        fn word(bytes: &mut &[u8]) -> Option<u64> {
+            take(bytes, 8)?.try_into().ok().map(u64::from_le_bytes)
+        }
+        fn array<T: bytemuck::AnyBitPattern>(bytes: &mut &[u8], pixels: usize) -> Option<Vec<T>> {
+            let n = usize::try_from(word(bytes)?).ok().filter(|n| *n == 0 || *n == pixels)?;
+            let raw = take(bytes, n.checked_mul(size_of::<T>())?)?;
+            Some(raw.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
+        }
+        Some(match take(bytes, 1)? {
+            [0] => Self::Empty,
+            [1] => Self::Open {
+                sums: array(bytes, pixels)?,
+                samples: array(bytes, pixels)?,
+                splats: array(bytes, pixels)?,
+                paths: word(bytes)?,
+            },
+            [2] => Self::Closed {
+                mean: array(bytes, pixels).filter(|m: &Vec<_>| m.len() == pixels)?,
+                weight: f64::from_bits(word(bytes)?),
+            },
+            _ => return None,
+        })
     }
 }

@@ -213,4 +213,81 @@ impl Merger {
             self.counters,
         )
     }
+
+    /// The whole state as bytes: a merger that is loaded from them goes on with the same bits.
+    pub fn save(&self) -> Vec<u8> {
+        let head = Head {
+            settings: self.settings.clone(),
+            plan: self.plan.clone(),
+            next: self.next,
+            done_spp: self.done_spp,
+            light_sums: self.light_sums.iter().map(|v| v.to_bits()).collect(),
+            counters: self.counters,
+            checkpoints_met: self.checkpoints_met,
+            finished: self.finished,
+        };
+        // A plain struct of numbers always serialises.
+        let head = serde_json::to_vec(&head).unwrap_or_default();
+        let mut out = (head.len() as u64).to_le_bytes().to_vec();
+        out.extend(head);
+        out.extend((self.aovs.len() as u64).to_le_bytes());
+        out.extend_from_slice(bytemuck::cast_slice(&self.aovs));
+        self.groups.iter().for_each(|g| g.save(&mut out));
+        let digest = blake3::hash(&out);
+        out.extend(digest.as_bytes());
+        out
+    }
+
+    /// Reads what [`Merger::save`] wrote; `None` when the bytes are damaged or of another version.
+    pub fn load(bytes: &[u8]) -> Option<Self> {
+        let (body, digest) = bytes.split_at_checked(bytes.len().checked_sub(blake3::OUT_LEN)?)?;
+        if blake3::hash(body).as_bytes() != digest {
+            return None;
+        }
+        let mut rest = body;
+        let mut take = |n: usize| {
+            let (head, tail) = rest.split_at_checked(n)?;
+            rest = tail;
+            Some(head)
+        };
+        let length = |raw: &[u8]| raw.try_into().ok().map(u64::from_le_bytes).and_then(|n| usize::try_from(n).ok());
+        let head_len = length(take(8)?)?;
+        let head: Head = serde_json::from_slice(take(head_len)?).ok()?;
+        head.settings.validate().ok()?;
+        let pixels = head.settings.width as usize * head.settings.height as usize;
+        let aovs = length(take(8)?)?;
+        let aovs = take(aovs.checked_mul(size_of::<Aov>())?)?;
+        let aovs: Vec<Aov> = aovs.chunks_exact(size_of::<Aov>()).map(bytemuck::pod_read_unaligned).collect();
+        if !aovs.is_empty() && aovs.len() != pixels {
+            return None;
+        }
+        let groups =
+            (0..head.settings.replicates).map(|_| GroupFilm::load(&mut rest, pixels)).collect::<Option<_>>()?;
+        Some(Self {
+            planner: Planner::new(head.settings.clone()),
+            settings: head.settings,
+            plan: head.plan,
+            next: head.next,
+            done_spp: head.done_spp,
+            groups,
+            aovs,
+            light_sums: head.light_sums.into_iter().map(f64::from_bits).collect(),
+            counters: head.counters,
+            checkpoints_met: head.checkpoints_met,
+            finished: head.finished,
+        })
+    }
+}
+
+/// The small part of a saved merger; floats that must keep their bits are stored as bits.
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Head {
+    settings: RenderSettings,
+    plan: PassPlan,
+    next: u32,
+    done_spp: u32,
+    light_sums: Vec<u64>,
+    counters: Counters,
+    checkpoints_met: u32,
+    finished: bool,
 }
