@@ -1,10 +1,17 @@
 //! Shapes: triangle meshes, spheres and disks, placed in the world; what is known at a hit.
 
+mod bake;
+mod disk;
 mod mesh;
+pub mod sphere;
+mod surface;
+pub mod triangle;
 
+pub use disk::WorldDisk;
 pub use mesh::{Mesh, MeshError};
 
-use crate::math::{Ray, Transform, Vec2, Vec3};
+use crate::math::{DVec3, Ray, Transform, Vec2, Vec3};
+use surface::SurfacePoint;
 
 /// Index of a mesh in [`Geometry::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,7 +42,7 @@ pub struct Object {
     pub flip_normals: bool,
 }
 
-/// All objects of a scene.
+/// All objects of a scene. Call [`Geometry::bake`] once before the acceleration tree is built.
 #[derive(Clone, Debug, Default)]
 pub struct Geometry {
     /// Shared by the objects that instance them.
@@ -102,4 +109,118 @@ pub struct SurfaceSample {
     pub uv: Vec2,
     /// Density with respect to surface area.
     pub pdf_area: f32,
+}
+
+/// A sphere that contains a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingSphere {
+    /// Centre, world space.
+    pub centre: Vec3,
+    /// Radius; 0 for an empty scene.
+    pub radius: f32,
+}
+
+impl Geometry {
+    /// What is known of the surface at `hit`, found with `ray`.
+    pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
+        let object = self.object(hit.object);
+        let s = match object.shape {
+            Shape::Mesh(mesh) => surface::at(self.mesh(mesh), object, hit.primitive, hit.b),
+            Shape::Sphere => sphere::at_hit(object, ray, hit.t),
+            Shape::Disk => disk::at_hit(object, ray, hit.t),
+        };
+        let SurfacePoint { p, p_error, ng, ns, uv, dpdu, dpdv } = s;
+        Interaction { p, p_error, ng, ns, uv, dpdu, dpdv, object: hit.object, primitive: hit.primitive }
+    }
+
+    /// A point uniform by area on one primitive: a triangle of a mesh object, or the whole sphere or disk.
+    pub fn sample_area(&self, id: ObjectId, primitive: u32, u: Vec2) -> SurfaceSample {
+        let object = self.object(id);
+        let s = match object.shape {
+            Shape::Mesh(mesh) => {
+                // Turk 1990, "Generating Random Points in Triangles".
+                let root = u.x.sqrt();
+                surface::at(self.mesh(mesh), object, primitive, [root * (1.0 - u.y), root * u.y])
+            }
+            Shape::Sphere => sphere::at(object, sphere::uniform_direction(u)),
+            Shape::Disk => {
+                let (x, y) = disk::uniform_point(u);
+                disk::at(object, x, y)
+            }
+        };
+        let pdf_area = self.pdf_area(id, primitive);
+        SurfaceSample { p: s.p, p_error: s.p_error, ng: s.ng, uv: s.uv, pdf_area }
+    }
+
+    /// Density of [`Geometry::sample_area`] with respect to area; 0 on a primitive without area.
+    pub fn pdf_area(&self, object: ObjectId, primitive: u32) -> f32 {
+        let pdf = 1.0 / self.area(object, primitive);
+        if pdf.is_finite() { pdf } else { 0.0 }
+    }
+
+    /// World-space area of a primitive.
+    pub fn area(&self, id: ObjectId, primitive: u32) -> f32 {
+        let object = self.object(id);
+        match object.shape {
+            Shape::Mesh(mesh) => surface::area(self.mesh(mesh), object, primitive),
+            Shape::Sphere => {
+                let r = f64::from(sphere::world(object).1);
+                (4.0 * std::f64::consts::PI * r * r) as f32
+            }
+            Shape::Disk => WorldDisk::of(object).area(),
+        }
+    }
+
+    /// Number of primitives of an object: triangles of its mesh, 1 for other shapes.
+    pub fn primitive_count(&self, object: ObjectId) -> u32 {
+        match self.object(object).shape {
+            Shape::Mesh(mesh) => self.mesh(mesh).triangles.len() as u32,
+            Shape::Sphere | Shape::Disk => 1,
+        }
+    }
+
+    /// World-space centre and radius of a sphere object; `None` for other shapes.
+    pub fn sphere_world(&self, object: ObjectId) -> Option<(Vec3, f32)> {
+        let object = self.object(object);
+        (object.shape == Shape::Sphere).then(|| sphere::world(object))
+    }
+
+    /// A sphere around all objects: that of their box.
+    pub fn bounds(&self) -> BoundingSphere {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let mut grow = |p: DVec3, reach: DVec3| {
+            low = low.min(p - reach);
+            high = high.max(p + reach);
+        };
+        for object in &self.objects {
+            let m = object.to_world.matrix();
+            match object.shape {
+                Shape::Mesh(mesh) => {
+                    let mesh = self.mesh(mesh);
+                    for &i in mesh.triangles.as_flattened() {
+                        grow(m.transform_point3(mesh.positions[i as usize].as_dvec3()), DVec3::ZERO);
+                    }
+                }
+                Shape::Sphere => grow(m.translation, DVec3::splat(f64::from(sphere::world(object).1))),
+                Shape::Disk => {
+                    let (a, b) = (m.matrix3.x_axis, m.matrix3.y_axis);
+                    grow(m.translation, DVec3::from_array([0, 1, 2].map(|i| (a[i] * a[i] + b[i] * b[i]).sqrt())));
+                }
+            }
+        }
+        if !(low.x <= high.x) {
+            return BoundingSphere { centre: Vec3::ZERO, radius: 0.0 };
+        }
+        let centre = (0.5 * (low + high)).as_vec3();
+        let reach = (high - centre.as_dvec3()).max(centre.as_dvec3() - low);
+        BoundingSphere { centre, radius: (reach.length() as f32).next_up() }
+    }
+
+    fn object(&self, id: ObjectId) -> &Object {
+        &self.objects[id.0 as usize]
+    }
+
+    fn mesh(&self, id: MeshId) -> &Mesh {
+        &self.meshes[id.0 as usize]
+    }
 }

@@ -1,5 +1,5 @@
 use super::rounding::gamma;
-use super::{DAffine3, DMat4, DVec3, Vec3};
+use super::{DAffine3, DMat3, DMat4, DVec3, Vec3};
 
 /// An affine map with its inverse; composed in f64, applied in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +30,13 @@ impl Transform {
     /// From a column-vector matrix whose last row is (0, 0, 0, 1); `None` when it is singular, projective or not finite.
     pub fn from_matrix(m: DMat4) -> Option<Self> {
         (m.row(3).abs_diff_eq(glam::DVec4::W, 1e-9)).then(|| Self::new(DAffine3::from_mat4(m))).flatten()
+    }
+
+    /// The map exactly as it is applied, in double precision.
+    #[inline]
+    pub fn matrix(&self) -> DAffine3 {
+        let [x, y, z, translation] = self.m.map(Vec3::as_dvec3);
+        DAffine3 { matrix3: DMat3::from_cols(x, y, z), translation }
     }
 
     /// Whether the map mirrors (negative determinant).

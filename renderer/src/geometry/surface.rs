@@ -1,0 +1,110 @@
+//! Points on a triangle of an object: interpolation of its corners, normals and texture coordinates, in the world.
+
+use super::{Mesh, Object};
+use crate::math::rounding::gamma;
+use crate::math::{DVec3, Frame, Transform, Vec2, Vec3};
+
+/// A world-space point of a triangle and the surface around it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SurfacePoint {
+    pub p: Vec3,
+    pub p_error: Vec3,
+    pub ng: Vec3,
+    pub ns: Vec3,
+    pub uv: Vec2,
+    pub dpdu: Vec3,
+    pub dpdv: Vec3,
+}
+
+/// The point with barycentric weights `b` (of the second and third corner) of `triangle`.
+///
+/// Computed in double precision: an affine combination of the corners lies in their plane to 1e-16, so that the only error of `p`
+/// is its rounding to f32 (and, for an instance, the rounding of the ray origin that will be mapped back to object space).
+pub(super) fn at(mesh: &Mesh, object: &Object, triangle: u32, b: [f32; 2]) -> SurfacePoint {
+    let corners = mesh.triangles[triangle as usize].map(|i| i as usize);
+    let [p0, p1, p2] = corners.map(|i| mesh.positions[i].as_dvec3());
+    let [b1, b2] = b.map(f64::from);
+    let local = p0 + (p1 - p0) * b1 + (p2 - p0) * b2;
+    // Place the point and the edges in the world.
+    let placed = object.to_world != Transform::IDENTITY;
+    let (p, e1, e2, p_error) = if placed {
+        let m = object.to_world.matrix();
+        let p = m.transform_point3(local);
+        (
+            p,
+            m.matrix3 * (p1 - p0),
+            m.matrix3 * (p2 - p0),
+            rounding(p.as_vec3()) + mapped_rounding(&object.to_world, local),
+        )
+    } else {
+        (local, p1 - p0, p2 - p0, rounding(local.as_vec3()))
+    };
+    // Geometric normal: by winding, outward under mirrored maps too.
+    let turn = object.flip_normals != object.to_world.flips_handedness();
+    let winding = normal_of(e1, e2);
+    let winding = if turn { -winding } else { winding };
+    let ns = shading_normal(mesh, object, corners, b).unwrap_or(winding);
+    let ng = if ns.dot(winding) < 0.0 { -winding } else { winding };
+    // Texture coordinates and the derivatives of the position with them.
+    let uvs = if mesh.uvs.is_empty() { [Vec2::ZERO, Vec2::X, Vec2::Y] } else { corners.map(|i| mesh.uvs[i]) };
+    let uv = uvs[0] * (1.0 - b[0] - b[1]) + uvs[1] * b[0] + uvs[2] * b[1];
+    let (dpdu, dpdv) = derivatives(uvs, e1, e2, ng);
+    SurfacePoint { p: p.as_vec3(), p_error, ng, ns, uv, dpdu, dpdv }
+}
+
+/// Area of a triangle in the world.
+pub(super) fn area(mesh: &Mesh, object: &Object, triangle: u32) -> f32 {
+    let [p0, p1, p2] = mesh.triangles[triangle as usize].map(|i| mesh.positions[i as usize].as_dvec3());
+    let m = object.to_world.matrix().matrix3;
+    (0.5 * (m * (p1 - p0)).cross(m * (p2 - p0)).length()) as f32
+}
+
+/// Bound of the error of a double-precision point that was rounded to `p`.
+pub(super) fn rounding(p: Vec3) -> Vec3 {
+    p.abs() * gamma(2)
+}
+
+/// Bound of the world-space error made when a ray origin near the image of `local` is mapped to object space and rounded there.
+fn mapped_rounding(to_world: &Transform, local: DVec3) -> Vec3 {
+    let m = to_world.matrix().matrix3;
+    let l = local.abs() * f64::from(gamma(2));
+    (m.x_axis.abs() * l.x + m.y_axis.abs() * l.y + m.z_axis.abs() * l.z).as_vec3()
+}
+
+/// The unit vector along `e1 x e2`; some unit vector when the triangle has no area.
+fn normal_of(e1: DVec3, e2: DVec3) -> Vec3 {
+    // Edges are scaled first: squares of small lengths must not vanish.
+    let scale = e1.abs().max_element().max(e2.abs().max_element());
+    if !(scale > 0.0) {
+        return Vec3::Z;
+    }
+    let n = (e1 / scale).cross(e2 / scale);
+    let length = n.length();
+    if length > 0.0 { (n / length).as_vec3() } else { Frame::from_normal((e1 + e2).normalize_or(DVec3::X).as_vec3()).s }
+}
+
+/// The interpolated vertex normal in the world; `None` without vertex normals and where they are useless (zero, NaN).
+fn shading_normal(mesh: &Mesh, object: &Object, corners: [usize; 3], b: [f32; 2]) -> Option<Vec3> {
+    if mesh.normals.is_empty() {
+        return None;
+    }
+    let [n0, n1, n2] = corners.map(|i| mesh.normals[i]);
+    let n = object.to_world.normal(n0 * (1.0 - b[0] - b[1]) + n1 * b[0] + n2 * b[1]).as_dvec3();
+    let length = n.length();
+    let n = (n / length).as_vec3();
+    (length > 0.0 && n.is_finite()).then_some(if object.flip_normals { -n } else { n })
+}
+
+/// `dp/du` and `dp/dv` of the linear map with the given texture coordinates at the corners; a frame around `ng` where it has none.
+fn derivatives(uvs: [Vec2; 3], e1: DVec3, e2: DVec3, ng: Vec3) -> (Vec3, Vec3) {
+    let (d1, d2) = ((uvs[1] - uvs[0]).as_dvec2(), (uvs[2] - uvs[0]).as_dvec2());
+    let det = d1.x * d2.y - d1.y * d2.x;
+    let dpdu = ((e1 * d2.y - e2 * d1.y) / det).as_vec3();
+    let dpdv = ((e2 * d1.x - e1 * d2.x) / det).as_vec3();
+    let usable = |v: Vec3| v.is_finite() && v.length_squared() > 0.0 && v.length_squared().is_finite();
+    if det != 0.0 && usable(dpdu) && usable(dpdv) && dpdu.cross(dpdv) != Vec3::ZERO {
+        return (dpdu, dpdv);
+    }
+    let frame = Frame::from_normal(ng);
+    (frame.s, frame.t)
+}
