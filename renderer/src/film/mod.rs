@@ -1,10 +1,12 @@
 //! The film: sums of tiles and splats, replicate groups, the merged image with its error.
 
+mod filter;
 mod group;
 mod image;
 mod splat;
 mod tile;
 
+pub use filter::{Filter, Footprint, MAX_FOOTPRINT};
 pub use group::GroupFilm;
 pub use image::{ErrorSummary, MergedImage};
 pub use splat::{BLOCK, SplatSums};

@@ -10,7 +10,7 @@ pub mod triangle;
 pub use disk::WorldDisk;
 pub use mesh::{Mesh, MeshError};
 
-use crate::math::{DVec3, Ray, Transform, Vec2, Vec3};
+use crate::math::{Anchor, DVec3, Ray, Transform, Vec2, Vec3};
 use surface::SurfacePoint;
 
 /// Index of a mesh in [`Geometry::meshes`].
@@ -92,7 +92,13 @@ impl Interaction {
     /// A ray that leaves the point in direction `w` (any side), clear of the surface.
     #[inline]
     pub fn spawn_ray(&self, w: Vec3) -> Ray {
-        Ray::new(crate::math::rounding::offset_ray_origin(self.p, self.p_error, self.ng, w), w)
+        self.anchor().ray(w)
+    }
+
+    /// Where rays start from or end at.
+    #[inline]
+    pub fn anchor(&self) -> Anchor {
+        Anchor { p: self.p, p_error: self.p_error, ng: self.ng }
     }
 }
 

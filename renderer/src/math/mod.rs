@@ -3,12 +3,14 @@
 //! Only glam's scalar types are used (`Vec2`, `Vec3`, `DVec3`, `DMat4`): its SIMD types (`Vec3A`, `Vec4`, `Quat`, `Affine3A`)
 //! change bits when the compiler may use FMA, and the same job must give the same bytes on every x86-64 machine.
 
+mod anchor;
 pub mod fns;
 mod frame;
 mod ray;
 pub mod rounding;
 mod transform;
 
+pub use anchor::Anchor;
 pub use fns::*;
 pub use frame::Frame;
 pub use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3, Vec2, Vec3};

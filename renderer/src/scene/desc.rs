@@ -194,18 +194,18 @@ pub enum FilterDesc {
 }
 
 impl FilterDesc {
-    /// Checks that the filter has a usable width (more than 0, at most 8 pixels).
+    /// Checks that the filter has a usable radius (more than 0, at most 8 pixels).
     pub fn validate(&self) -> Result<(), String> {
-        let (what, v) = match *self {
-            Self::Box { radius } => ("radius of the box filter", radius),
-            Self::Tent { radius } => ("radius of the tent filter", radius),
-            Self::Gaussian { stddev } => ("standard deviation of the Gaussian filter", stddev),
-            Self::BlackmanHarris { radius } => ("radius of the Blackman-Harris filter", radius),
+        let (what, v, limit) = match *self {
+            Self::Box { radius } => ("radius of the box filter", radius, 8.0),
+            Self::Tent { radius } => ("radius of the tent filter", radius, 8.0),
+            Self::Gaussian { stddev } => ("standard deviation of the Gaussian filter", stddev, 2.0),
+            Self::BlackmanHarris { radius } => ("radius of the Blackman-Harris filter", radius, 8.0),
         };
-        if v > 0.0 && v <= 8.0 {
+        if v > 0.0 && v <= limit {
             Ok(())
         } else {
-            Err(format!("the {what} is {v}; it must be above 0 and at most 8 pixels"))
+            Err(format!("the {what} is {v}; it must be above 0 and at most {limit} pixels"))
         }
     }
 }

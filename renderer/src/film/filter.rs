@@ -1,0 +1,169 @@
+//! Pixel reconstruction filters: sampled around a pixel, or spread over the pixels around a splat, with the same density.
+
+use crate::math::{ONE_MINUS_EPSILON, Vec2, cos64, exp64};
+use crate::scene::desc::FilterDesc;
+
+/// Most pixels that a splat covers along one axis: filters are at most 8 pixels wide to each side.
+pub const MAX_FOOTPRINT: usize = 17;
+
+/// A separable filter.
+///
+/// Pixel j's weight at raster position x is `h_j(x) = k(x - centre_j)`, a density over the raster: its integral is 1. Where the
+/// filter reaches beyond the picture it is cut off there and scaled up to integrate to 1 again, as happens in renderers that divide by
+/// the sum of weights.
+///
+/// The profile `k` is a table, linear in between (exact for box and tent); sampling and weights use the same table, so what is
+/// sampled around pixels and what is splatted converge to the same picture.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    radius: f32,
+    /// Width of a table cell.
+    step: f32,
+    /// The profile at the cells' borders, from -radius to radius: per pixel, integral 1.
+    density: Vec<f32>,
+    /// Integral of the profile up to each of the borders.
+    cumulative: Vec<f32>,
+    /// Size of the picture.
+    size: [u32; 2],
+}
+
+/// The pixels that a splat covers, and its weight in each.
+#[derive(Clone, Copy, Debug)]
+pub struct Footprint {
+    origin: [u32; 2],
+    count: [usize; 2],
+    weights: [[f32; MAX_FOOTPRINT]; 2],
+}
+
+impl Footprint {
+    /// (x, y, weight) of each pixel; weights are per pixel area.
+    #[inline]
+    pub fn iter(&self) -> impl Iterator<Item = (u32, u32, f32)> + '_ {
+        let [wx, wy] = &self.weights;
+        (0..self.count[1]).flat_map(move |j| {
+            (0..self.count[0]).map(move |i| (self.origin[0] + i as u32, self.origin[1] + j as u32, wx[i] * wy[j]))
+        })
+    }
+}
+
+impl Filter {
+    /// The filter for a picture of `width` times `height` pixels. A width out of range (see `FilterDesc::validate`) is brought into it.
+    pub fn new(desc: &FilterDesc, width: u32, height: u32) -> Self {
+        let (radius, cells) = match *desc {
+            FilterDesc::Box { radius } => (radius, 1),
+            FilterDesc::Tent { radius } => (radius, 2),
+            FilterDesc::Gaussian { stddev } => (4.0 * stddev, 256),
+            FilterDesc::BlackmanHarris { radius } => (radius, 256),
+        };
+        let radius = if radius > 0.0 { radius.clamp(1e-3, 8.0) } else { 0.5 };
+        // Tabulate the profile over [-1, 1], and scale it to integral 1.
+        let step = 2.0 / cells as f64;
+        let profile: Vec<f64> = (0..=cells).map(|i| profile(desc, (step * i as f64 - 1.0).abs())).collect();
+        let mut sums = vec![0.0f64];
+        for pair in profile.windows(2) {
+            sums.push(sums[sums.len() - 1] + 0.5 * step * (pair[0] + pair[1]));
+        }
+        let total = sums[sums.len() - 1];
+        Self {
+            radius,
+            step: (step * f64::from(radius)) as f32,
+            density: profile.iter().map(|d| (d / (total * f64::from(radius))) as f32).collect(),
+            cumulative: sums.iter().map(|s| (s / total) as f32).collect(),
+            size: [width, height],
+        }
+    }
+
+    /// Half its width in pixels.
+    #[inline]
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// A raster position with density `h` of the pixel (x, y) of the picture, by `u` in [0, 1)^2.
+    #[inline]
+    pub fn sample(&self, u: Vec2, x: u32, y: u32) -> Vec2 {
+        Vec2::new(self.sample_axis(u.x, x, self.size[0]), self.sample_axis(u.y, y, self.size[1]))
+    }
+
+    /// The pixels whose filter covers the raster position, with their `h` there; none outside the picture.
+    #[inline]
+    pub fn weights(&self, raster: Vec2) -> Footprint {
+        let mut f = Footprint { origin: [0; 2], count: [0; 2], weights: [[0.0; MAX_FOOTPRINT]; 2] };
+        for (axis, x) in raster.to_array().into_iter().enumerate() {
+            (f.origin[axis], f.count[axis]) = self.weights_axis(x, self.size[axis], &mut f.weights[axis]);
+        }
+        f
+    }
+
+    /// Integral of the profile from -radius to `t`.
+    fn cdf(&self, t: f32) -> f32 {
+        let (cell, s) = self.cell(t);
+        let (d0, d1) = (self.density[cell], self.density[cell + 1]);
+        self.cumulative[cell] + self.step * s * (d0 + 0.5 * s * (d1 - d0))
+    }
+
+    /// The table cell that holds `t`, and where in it (0 to 1).
+    fn cell(&self, t: f32) -> (usize, f32) {
+        let x = ((t + self.radius) / self.step).max(0.0);
+        let cell = (x as usize).min(self.density.len() - 2);
+        (cell, (x - cell as f32).min(1.0))
+    }
+
+    fn density(&self, t: f32) -> f32 {
+        let (cell, s) = self.cell(t);
+        self.density[cell] + s * (self.density[cell + 1] - self.density[cell])
+    }
+
+    /// The share of the filter of pixel `i` that lies inside the picture, as an interval of the profile's integral.
+    fn inside(&self, i: u32, size: u32) -> (f32, f32) {
+        let centre = i as f32 + 0.5;
+        let low = if centre < self.radius { self.cdf(-centre) } else { 0.0 };
+        let rest = (size - i) as f32 - 0.5;
+        let high = if rest < self.radius { self.cdf(rest) } else { 1.0 };
+        (low, high)
+    }
+
+    fn sample_axis(&self, u: f32, i: u32, size: u32) -> f32 {
+        let (low, high) = self.inside(i, size);
+        let target = low + u * (high - low);
+        // Find the cell, then invert the integral of its linear density: d0 s + (d1 - d0) s^2 / 2 = rest.
+        let cell = self.cumulative.partition_point(|&c| c <= target).clamp(1, self.density.len() - 1) - 1;
+        let (d0, d1) = (self.density[cell], self.density[cell + 1]);
+        let rest = (target - self.cumulative[cell]) / self.step;
+        let root = (d0 * d0 + 2.0 * rest * (d1 - d0)).max(0.0).sqrt();
+        let s = if rest > 0.0 { (2.0 * rest / (d0 + root)).min(1.0) } else { 0.0 };
+        let t = -self.radius + self.step * (cell as f32 + s);
+        (i as f32 + 0.5 + t).clamp(0.0, size as f32 * ONE_MINUS_EPSILON)
+    }
+
+    fn weights_axis(&self, x: f32, size: u32, weights: &mut [f32; MAX_FOOTPRINT]) -> (u32, usize) {
+        if !(x >= 0.0 && x < size as f32) {
+            return (0, 0);
+        }
+        // Pixels with -radius <= x - centre < radius.
+        let first = ((x - self.radius - 0.5).floor() as i64 + 1).max(0);
+        let last = ((x + self.radius - 0.5).floor() as i64).min(i64::from(size) - 1);
+        let count = (last + 1 - first).clamp(0, MAX_FOOTPRINT as i64) as usize;
+        let first = first as u32;
+        for (i, w) in (first..).zip(&mut weights[..count]) {
+            let (low, high) = self.inside(i, size);
+            *w = self.density(x - (i as f32 + 0.5)) / (high - low);
+        }
+        (first, count)
+    }
+}
+
+/// The unnormalised profile at distance `t` in [0, 1] radii.
+fn profile(desc: &FilterDesc, t: f64) -> f64 {
+    match desc {
+        FilterDesc::Box { .. } => 1.0,
+        FilterDesc::Tent { .. } => 1.0 - t,
+        // Four standard deviations are one radius.
+        FilterDesc::Gaussian { .. } => exp64(-8.0 * t * t) - exp64(-8.0),
+        // Harris 1978, "On the Use of Windows for Harmonic Analysis", four terms, minimum side lobes.
+        FilterDesc::BlackmanHarris { .. } => {
+            let a = std::f64::consts::PI * (1.0 - t);
+            (0.35875 - 0.48829 * cos64(a) + 0.14128 * cos64(2.0 * a) - 0.01168 * cos64(3.0 * a)).max(0.0)
+        }
+    }
+}

@@ -1,0 +1,41 @@
+use super::rounding::{gamma, offset_ray_origin};
+use super::{Ray, Vec3};
+
+/// A point where a ray starts or ends: on a surface, or in free space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anchor {
+    /// The point, world space.
+    pub p: Vec3,
+    /// Absolute error bound of each coordinate of `p`.
+    pub p_error: Vec3,
+    /// Unit geometric normal of the surface; zero in free space.
+    pub ng: Vec3,
+}
+
+impl Anchor {
+    /// A point that lies on no surface (a camera, a point light, a point in a medium).
+    #[inline]
+    pub fn free(p: Vec3) -> Self {
+        Self { p, p_error: Vec3::ZERO, ng: Vec3::ZERO }
+    }
+
+    /// A ray without end in direction `w`, clear of the surface on the side of `w`.
+    #[inline]
+    pub fn ray(&self, w: Vec3) -> Ray {
+        Ray::new(offset_ray_origin(self.p, self.p_error, self.ng, w), w)
+    }
+
+    /// The segment to `end` (parameter 0 to 1, not of unit length), clear of both surfaces on the sides that face each other.
+    ///
+    /// A fixed share of the length is not enough to stay clear of the surface at `end`, and too much elsewhere. So the end is
+    /// moved along its normal by the error of the point, plus what the ray's own rounding (of origin, direction and the intersection
+    /// test, all relative to the coordinates) can move it across the surface.
+    #[inline]
+    pub fn segment_to(&self, end: &Anchor) -> Ray {
+        let towards = end.p - self.p;
+        let o = offset_ray_origin(self.p, self.p_error, self.ng, towards);
+        let rounding = (o.abs() + end.p.abs()) * gamma(8);
+        let q = offset_ray_origin(end.p, end.p_error + rounding, end.ng, -towards);
+        Ray::segment(o, q - o, 1.0)
+    }
+}
