@@ -1,12 +1,12 @@
 //! What every importer produces: plain data with typed indices. Metres, right-handed, +Y up, linear Rec.709 radiance.
 
 use crate::bsdf::{Material, MaterialId};
+pub use crate::camera::{CameraDesc, FovAxis};
 use crate::geometry::{Mesh, MeshId};
-use crate::math::{DAffine3, DVec3};
-use crate::spectrum::Rgb;
-use crate::texture::{Image, RgbParam, Texture};
+pub use crate::light::{Emission, LightDesc, SpotFalloff};
+use crate::math::DAffine3;
+use crate::texture::Texture;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// A whole scene.
 #[derive(Clone, Debug, Default)]
@@ -57,114 +57,6 @@ pub struct ShapeDesc {
     pub material: MaterialId,
     /// Light it emits, if any.
     pub emission: Option<Emission>,
-}
-
-/// Emission of a surface: the same radiance in every direction of the hemisphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Emission {
-    /// Radiance.
-    pub radiance: RgbParam,
-    /// Also from the back (glTF double-sided).
-    pub two_sided: bool,
-}
-
-/// How a spot's intensity falls from its beam to its cutoff.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpotFalloff {
-    /// Linear in the angle (Mitsuba).
-    LinearAngle,
-    /// `clamp((cos - cos_cutoff) / (cos_beam - cos_cutoff))` squared (KHR_lights_punctual).
-    SquaredCosine,
-}
-
-/// A light that is not a shape.
-#[derive(Clone, Debug)]
-pub enum LightDesc {
-    /// Isotropic point.
-    Point {
-        /// World space.
-        position: DVec3,
-        /// Radiant intensity, power per steradian.
-        intensity: Rgb,
-    },
-    /// Point with a cone.
-    Spot {
-        /// World space.
-        position: DVec3,
-        /// Where it points.
-        direction: DVec3,
-        /// Radiant intensity on the axis.
-        intensity: Rgb,
-        /// Half angle of full intensity, degrees.
-        beam: f64,
-        /// Half angle of zero intensity, degrees; > beam or equal for a hard edge.
-        cutoff: f64,
-        /// In between.
-        falloff: SpotFalloff,
-    },
-    /// Parallel light.
-    Directional {
-        /// The direction in which the light travels.
-        direction: DVec3,
-        /// Irradiance on a surface that faces it.
-        irradiance: Rgb,
-    },
-    /// The same radiance from every direction.
-    Constant {
-        /// Radiance.
-        radiance: Rgb,
-    },
-    /// An equirectangular picture: row 0 is +Y of the light's space; u = 0.5 + atan2(x, -z) / 2 pi, so that -Z is the centre column.
-    Environment {
-        /// Radiance.
-        image: Arc<Image>,
-        /// Multiplies it.
-        scale: Rgb,
-        /// Light space to world (rotation part used).
-        to_world: DAffine3,
-    },
-}
-
-/// Which side of the picture an angle of view spans.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FovAxis {
-    /// Width.
-    X,
-    /// Height.
-    Y,
-    /// The shorter side.
-    Smaller,
-    /// The longer side.
-    Larger,
-    /// Corner to corner.
-    Diagonal,
-}
-
-/// A perspective camera that looks along its own -Z, with +X to the right and +Y up.
-#[derive(Clone, Debug)]
-pub struct CameraDesc {
-    /// Camera to world; scale is ignored.
-    pub to_world: DAffine3,
-    /// Full angle of view, degrees, in (0, 180).
-    pub fov: f64,
-    /// The side that `fov` spans.
-    pub fov_axis: FovAxis,
-    /// Radius of the lens; 0 = pinhole.
-    pub aperture_radius: f64,
-    /// Distance of the plane in focus, along -Z.
-    pub focus_distance: f64,
-}
-
-impl Default for CameraDesc {
-    fn default() -> Self {
-        Self {
-            to_world: DAffine3::IDENTITY,
-            fov: 45.0,
-            fov_axis: FovAxis::Y,
-            aperture_radius: 0.0,
-            focus_distance: 1.0,
-        }
-    }
 }
 
 /// Pixel reconstruction filter.
