@@ -1,1 +1,41 @@
-//! Placeholder.
+//! Hypothesis tests for the statistical tests of the other crates. Everything is f64 and deterministic.
+
+mod chi2;
+mod gamma;
+mod mean;
+
+pub use chi2::{Chi2, chi2_test, chi2_test_with_errors};
+pub use gamma::upper_gamma;
+pub use mean::Mean;
+
+/// p-value of a chi-squared statistic with `dof` degrees of freedom: the probability of a larger one by chance.
+pub fn chi2_p_value(statistic: f64, dof: f64) -> f64 {
+    upper_gamma(0.5 * dof, 0.5 * statistic)
+}
+
+/// Two-sided p-value of a standard normal deviate.
+pub fn normal_p_value(z: f64) -> f64 {
+    libm::erfc(z.abs() / std::f64::consts::SQRT_2)
+}
+
+/// Significance for each of `n` independent tests such that all together falsely reject with probability `family` (Sidak 1967).
+pub fn sidak(family: f64, n: usize) -> f64 {
+    -libm::expm1(libm::log1p(-family) / n as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values of the usual tables.
+    #[test]
+    fn quantiles() {
+        for (z, p) in [(1.959_963_985, 0.05), (2.575_829_304, 0.01), (3.290_526_731, 0.001)] {
+            assert!((normal_p_value(z) / p - 1.0).abs() < 1e-8);
+        }
+        for (x, dof, p) in [(3.841_458_8, 1.0, 0.05), (18.307_038, 10.0, 0.05), (135.806_72, 100.0, 0.01)] {
+            assert!((chi2_p_value(x, dof) / p - 1.0).abs() < 1e-6, "{x} {dof}: {}", chi2_p_value(x, dof));
+        }
+        assert!((1.0 - libm::pow(1.0 - sidak(0.01, 7), 7.0) - 0.01).abs() < 1e-12);
+    }
+}
