@@ -1,3 +1,4 @@
+use super::blocks::{BlockErrors, BlockScatter};
 use super::{Aov, Counters, GroupFilm};
 use serde::{Deserialize, Serialize};
 
@@ -30,10 +31,12 @@ pub struct MergedImage {
     pub std_error: Vec<[f32; 3]>,
     /// Samples of each pixel over all groups (light tracing: light paths per pixel).
     pub samples: Vec<f32>,
-    /// Averages of the auxiliary values; empty when the integrator has none.
+    /// Averages of the auxiliary values (`hits` = the share of samples that hit a surface); empty when the integrator has none.
     pub aovs: Vec<Aov>,
     /// The error of the whole; `None` with fewer than two groups.
     pub error: Option<ErrorSummary>,
+    /// The error of blocks of pixels.
+    pub blocks: BlockErrors,
     /// Sum over all units.
     pub counters: Counters,
 }
@@ -41,8 +44,13 @@ pub struct MergedImage {
 impl MergedImage {
     /// Merges groups: the mean weighted by samples; its variance from the scatter between groups,
     /// `sum n_g (I_g - I)^2 / ((G - 1) sum n_g)`, which is unbiased for unequal `n_g` too.
-    pub fn from_groups(width: u32, height: u32, groups: &[GroupFilm], aovs: Vec<Aov>, counters: Counters) -> Self {
+    ///
+    /// `aovs` are sums over the samples of group 0, or empty.
+    pub fn from_groups(width: u32, height: u32, groups: &[GroupFilm], mut aovs: Vec<Aov>, counters: Counters) -> Self {
         let pixels = width as usize * height as usize;
+        for (i, aov) in aovs.iter_mut().enumerate() {
+            aov.average(groups.first().map_or(0.0, |g| g.pixel(i).1));
+        }
         let mut image = Self {
             width,
             height,
@@ -51,15 +59,19 @@ impl MergedImage {
             samples: Vec::with_capacity(pixels),
             aovs,
             error: None,
+            blocks: BlockErrors { std_error: Vec::new(), image: None },
             counters,
         };
         let mut scatter = GroupScatter::new(groups.len());
+        let mut blocks = BlockScatter::new(width, height, groups.len());
         let mut values = Vec::with_capacity(groups.len());
         for i in 0..pixels {
             values.clear();
             values.extend(groups.iter().enumerate().map(|(g, f)| (g, f.pixel(i))).filter(|(_, (_, n))| *n > 0.0));
             image.push_pixel(&values, &mut scatter);
+            values.iter().for_each(|(g, (v, n))| blocks.add(i, *g, v, *n));
         }
+        image.blocks = blocks.finish();
         image.error = scatter.summary(pixels);
         image
     }

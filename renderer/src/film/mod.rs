@@ -1,11 +1,15 @@
-//! The film: sums of tiles and splats, replicate groups, the merged image with its error.
+//! The film: sums of tiles and splats, replicate groups, the merged image with its error, and picture files.
 
+mod blocks;
+pub mod exr;
 mod filter;
 mod group;
 mod image;
+pub mod png;
 mod splat;
 mod tile;
 
+pub use blocks::{BlockErrors, ChannelMeans, ERROR_BLOCK};
 pub use filter::{Filter, Footprint, MAX_FOOTPRINT};
 pub use group::GroupFilm;
 pub use image::{ErrorSummary, MergedImage};

@@ -46,7 +46,7 @@ pub struct Aov {
     pub albedo: [f32; 3],
     /// World-space shading normal.
     pub normal: [f32; 3],
-    /// Distance from the camera.
+    /// Distance from the camera; averaged, infinite where nothing was hit.
     pub depth: f32,
     /// Samples that hit a surface (depth averages over these).
     pub hits: f32,
@@ -62,6 +62,15 @@ impl Aov {
         }
         self.depth += o.depth;
         self.hits += o.hits;
+    }
+
+    /// Turns sums over `samples` samples into averages: depth over the hits, all else over the samples.
+    pub fn average(&mut self, samples: f64) {
+        let scale = if samples > 0.0 { (1.0 / samples) as f32 } else { 0.0 };
+        self.albedo = self.albedo.map(|v| v * scale);
+        self.normal = self.normal.map(|v| v * scale);
+        self.depth = if self.hits > 0.0 { self.depth / self.hits } else { f32::INFINITY };
+        self.hits *= scale;
     }
 }
 

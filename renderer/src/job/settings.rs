@@ -1,4 +1,6 @@
+use crate::film::exr::Provenance;
 use crate::integrator::IntegratorKind;
+use crate::scene::bundle::Digest;
 use crate::scene::desc::{FilterDesc, RenderDefaults};
 use serde::{Deserialize, Serialize};
 
@@ -97,6 +99,12 @@ impl RenderSettings {
         };
         settings.validate()?;
         Ok(settings)
+    }
+
+    /// What an image made with these settings says of itself.
+    pub fn provenance(&self, scene: Digest) -> Provenance {
+        // A plain struct of numbers always serialises.
+        Provenance { scene, seed: self.seed, settings: serde_json::to_value(self).unwrap_or_default() }
     }
 
     /// Checks what came over the wire or from a user.

@@ -171,7 +171,7 @@ thread_local! {
 /// Runs a third-party decoder and turns a panic of it into an error. The decoders index and multiply numbers of damaged files in
 /// places that can't be checked from outside (Huffman tables, wavelet blocks, run lengths). The panic message is kept off the
 /// terminal, where it would read like a fault of the user's.
-fn quietly<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(crate) fn quietly<T>(decode: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let previous = std::panic::take_hook();
