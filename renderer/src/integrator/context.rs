@@ -1,3 +1,6 @@
+use crate::camera::Camera;
+use crate::film::Filter;
+use crate::light::LightSelector;
 use crate::scene::Scene;
 use crate::scene::desc::FilterDesc;
 
@@ -8,12 +11,17 @@ pub struct View {
     pub width: u32,
     /// Height in pixels.
     pub height: u32,
+    /// The scene's camera for this film.
+    pub camera: Camera,
+    /// The film's filter.
+    pub filter: Filter,
 }
 
 impl View {
-    /// The scene's camera, for a film of this size.
-    pub fn new(_scene: &Scene, width: u32, height: u32, _filter: FilterDesc) -> Self {
-        Self { width, height }
+    /// The scene's camera, for a film of this size. `None` when the film is empty (the camera was checked with the scene).
+    pub fn new(scene: &Scene, width: u32, height: u32, filter: FilterDesc) -> Option<Self> {
+        let camera = Camera::new(&scene.camera, width, height).ok()?;
+        Some(Self { width, height, camera, filter: Filter::new(&filter, width, height) })
     }
 }
 
@@ -31,8 +39,8 @@ pub struct UnitContext<'a> {
     pub max_depth: u32,
     /// Edges from which Russian roulette may end a path.
     pub rr_depth: u32,
-    /// Selection weights of the lights; empty = by power.
-    pub light_weights: &'a [f32],
+    /// Chooses lights: by power, or as the plan says.
+    pub selector: &'a LightSelector,
     /// Whether the unit should end without a result.
     pub stopped: &'a dyn Fn() -> bool,
 }

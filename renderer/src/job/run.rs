@@ -3,9 +3,13 @@ use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::SplatSums;
 use crate::integrator::{self, UnitContext, View};
+use crate::light::LightSelector;
 use crate::scene::Scene;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Share of the light paths that learned selection still deals to all lights alike.
+const UNIFORM_SHARE: f32 = 0.2;
 
 /// Asks units to end early; a stopped unit has no result.
 #[derive(Debug, Default)]
@@ -66,7 +70,9 @@ pub fn run_unit(
 }
 
 fn run(scene: &Scene, settings: &RenderSettings, plan: &PassPlan, unit: &Unit, stop: &Stop) -> Option<UnitResult> {
-    let view = View::new(scene, settings.width, settings.height, settings.filter);
+    let view = View::new(scene, settings.width, settings.height, settings.filter)?;
+    let learned = (plan.light_weights.len() == scene.lights.len() && !scene.lights.is_empty())
+        .then(|| LightSelector::defensive(&plan.light_weights, UNIFORM_SHARE));
     let context = UnitContext {
         scene,
         view: &view,
@@ -74,7 +80,7 @@ fn run(scene: &Scene, settings: &RenderSettings, plan: &PassPlan, unit: &Unit, s
         replicate: unit.replicate,
         max_depth: settings.max_depth.unwrap_or(u32::MAX),
         rr_depth: settings.rr_depth,
-        light_weights: &plan.light_weights,
+        selector: learned.as_ref().unwrap_or(&scene.selector),
         stopped: &|| stop.stopped(),
     };
     let mut result =

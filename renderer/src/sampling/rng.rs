@@ -63,6 +63,11 @@ impl IndependentSampler {
 
 impl Sampler for IndependentSampler {
     #[inline]
+    fn start_vertex(&mut self, vertex: u32) {
+        self.counter = u64::from(vertex) * 8;
+    }
+
+    #[inline]
     fn next_1d(&mut self) -> f32 {
         unit_f32((self.next_bits() >> 32) as u32)
     }

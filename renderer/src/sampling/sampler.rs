@@ -8,4 +8,7 @@ pub trait Sampler {
     fn next_1d(&mut self) -> f32;
     /// The next two numbers, well distributed in the unit square.
     fn next_2d(&mut self) -> Vec2;
+    /// Moves on to the block of numbers that belongs to a vertex (1, 2, ...), whatever was used before: what happens at one vertex
+    /// does not shift the numbers of the next. A vertex uses at most eight calls.
+    fn start_vertex(&mut self, vertex: u32);
 }

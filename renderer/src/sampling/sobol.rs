@@ -38,6 +38,11 @@ impl SobolSampler {
 
 impl Sampler for SobolSampler {
     #[inline]
+    fn start_vertex(&mut self, vertex: u32) {
+        self.pair = vertex.wrapping_mul(8);
+    }
+
+    #[inline]
     fn next_1d(&mut self) -> f32 {
         let (index, scramble, _) = self.next_pair();
         unit_f32(laine_karras(index, scramble).reverse_bits())

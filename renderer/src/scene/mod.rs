@@ -2,33 +2,189 @@
 
 pub mod bundle;
 pub mod desc;
+mod features;
 pub mod import;
+mod shapes;
 
+pub use features::SceneFeatures;
+
+use crate::accel::Accel;
+use crate::bsdf::{Material, MaterialId, first_bad_nesting};
 use crate::diagnostics::{Diagnostics, SceneError};
+use crate::geometry::{Geometry, Interaction, Object};
+use crate::light::{BoundingSphere, Light, LightContext, LightSelector};
+use crate::math::Transform;
+use crate::texture::Texture;
 use bundle::FileSource;
-use desc::SceneDesc;
+use desc::{SceneDesc, ShapeDesc};
 
 /// An immutable scene, ready to render; shared by all threads.
 #[derive(Debug)]
 pub struct Scene {
+    /// Meshes and objects.
+    pub geometry: Geometry,
+    /// Finds hits.
+    pub accel: Accel,
+    /// By [`MaterialId`].
+    pub materials: Vec<Material>,
+    /// By `TextureId`.
+    pub textures: Vec<Texture>,
+    /// Every light: emitting objects first.
+    pub lights: Vec<Light>,
+    /// The lights that rays which leave the scene see; indices into `lights`.
+    pub infinite_lights: Vec<u32>,
+    /// Chooses lights by power.
+    pub selector: LightSelector,
+    /// What the objects are.
+    pub objects: Vec<ObjectInfo>,
+    /// The camera.
+    pub camera: desc::CameraDesc,
     /// What the scene file says of rendering.
     pub defaults: desc::RenderDefaults,
+    /// What the scene contains, and so what is skipped.
+    pub features: SceneFeatures,
+    bounds: BoundingSphere,
+}
+
+/// What belongs to an object beside its shape.
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectInfo {
+    /// What it is made of.
+    pub material: MaterialId,
+    /// Index into `Scene::lights` when it emits.
+    pub light: Option<u32>,
 }
 
 impl Scene {
     /// Loads a scene file and builds it; warnings come back beside the scene.
     pub fn load(files: &dyn FileSource, root: &str) -> Result<(Self, Diagnostics), SceneError> {
-        let (desc, diagnostics) = import::load(files, root)?;
-        Ok((Self::build(desc), diagnostics))
+        let (desc, mut diagnostics) = import::load(files, root)?;
+        match Self::build(desc, root, &mut diagnostics) {
+            Some(scene) => Ok((scene, diagnostics)),
+            None => Err(SceneError(diagnostics.list)),
+        }
     }
 
-    /// Builds the acceleration structure, lights and features of a description.
-    pub fn build(desc: SceneDesc) -> Self {
-        Self { defaults: desc.defaults }
+    /// Builds the acceleration structure, lights and features of a description; `None` when `diagnostics` got an error.
+    pub fn build(desc: SceneDesc, file: &str, diagnostics: &mut Diagnostics) -> Option<Self> {
+        let SceneDesc { meshes, shapes, textures, materials, lights: light_descs, camera, defaults } = desc;
+        check_references(&materials, &meshes, &shapes, file, diagnostics);
+        if diagnostics.has_errors() {
+            return None;
+        }
+
+        // Place the shapes.
+        let mut builder = shapes::ObjectBuilder::new(meshes);
+        let mut objects = Vec::with_capacity(shapes.len());
+        for shape in &shapes {
+            match builder.object(shape) {
+                Ok(object) => objects.push(object),
+                Err(message) => diagnostics.error(file, shape.name.clone(), message, ""),
+            }
+        }
+        let geometry = Geometry::new(builder.meshes, objects);
+        let bounds = geometry.bounds();
+        if let Err(e) = crate::camera::Camera::new(&camera, 16, 16) {
+            diagnostics.error(file, "camera", format!("the camera can't be used: {e}"), "");
+        }
+        if diagnostics.has_errors() {
+            return None;
+        }
+
+        // Collect the lights: emitting objects, then the rest.
+        let mut lights = Vec::new();
+        let mut info = Vec::with_capacity(shapes.len());
+        for (i, shape) in shapes.iter().enumerate() {
+            let light = emission(&geometry, i, shape).map(|light| {
+                lights.push(light);
+                lights.len() as u32 - 1
+            });
+            info.push(ObjectInfo { material: shape.material, light });
+        }
+        for (i, d) in light_descs.iter().enumerate() {
+            match Light::from_desc(d) {
+                Ok(light) => lights.extend(light),
+                Err(e) => diagnostics.error(file, format!("light {i}"), format!("the light can't be used: {e}"), ""),
+            }
+        }
+        let accel = Accel::build(&geometry)
+            .map_err(|e| diagnostics.error(file, "", format!("the geometry can't be used: {e}"), ""))
+            .ok();
+        if diagnostics.has_errors() {
+            return None;
+        }
+
+        // Find what is there.
+        let infinite_lights = (0..lights.len() as u32).filter(|i| lights[*i as usize].flags().infinite).collect();
+        let context = LightContext { geometry: &geometry, textures: &textures, bounds };
+        let powers: Vec<f32> = lights.iter().map(|l| l.power(&context).luminance()).collect();
+        let features = SceneFeatures::find(&geometry, &materials, &textures, &lights, &info);
+        Some(Self {
+            accel: accel?,
+            selector: LightSelector::new(&powers),
+            geometry,
+            materials,
+            textures,
+            lights,
+            infinite_lights,
+            objects: info,
+            camera,
+            defaults,
+            features,
+            bounds,
+        })
     }
 
     /// Number of lights.
     pub fn light_count(&self) -> usize {
-        0
+        self.lights.len()
     }
+
+    /// What lights refer to.
+    #[inline]
+    pub fn light_context(&self) -> LightContext<'_> {
+        LightContext { geometry: &self.geometry, textures: &self.textures, bounds: self.bounds }
+    }
+
+    /// The light that the surface at a hit is, with its index.
+    #[inline]
+    pub fn light_at(&self, hit: &Interaction) -> Option<(u32, &Light)> {
+        let index = self.objects[hit.object.0 as usize].light?;
+        Some((index, &self.lights[index as usize]))
+    }
+}
+
+/// The light of a shape that emits; none of a black one.
+fn emission(geometry: &Geometry, index: usize, shape: &ShapeDesc) -> Option<Light> {
+    Light::area(geometry, crate::geometry::ObjectId(index as u32), shape.emission.as_ref()?)
+}
+
+/// Checks what importers should never get wrong, so that no index can panic later.
+fn check_references(
+    materials: &[Material],
+    meshes: &[crate::geometry::Mesh],
+    shapes: &[ShapeDesc],
+    file: &str,
+    diagnostics: &mut Diagnostics,
+) {
+    if let Some(id) = first_bad_nesting(materials) {
+        let message = "the material wraps itself, another one too deep, or one that does not exist";
+        diagnostics.error(file, format!("material {}", id.0), message, "");
+    }
+    for (i, mesh) in meshes.iter().enumerate() {
+        if let Err(e) = mesh.validate() {
+            diagnostics.error(file, format!("mesh {i}"), e.to_string(), "");
+        }
+    }
+    for shape in shapes {
+        let mesh_missing = matches!(shape.kind, desc::ShapeKind::Mesh(id) if id.0 as usize >= meshes.len());
+        if shape.material.0 as usize >= materials.len() || mesh_missing {
+            diagnostics.error(file, shape.name.clone(), "the shape names a mesh or material that does not exist", "");
+        }
+    }
+}
+
+/// An object for a shape's transform.
+fn placed(shape: crate::geometry::Shape, to_world: Transform, flip_normals: bool) -> Object {
+    Object { shape, to_world, flip_normals }
 }
