@@ -1,5 +1,7 @@
 //! Plans, bytes and merges: every sample is planned once, every result keeps its bits, and no order or interruption changes a film.
 
+#![allow(clippy::unwrap_used, reason = "test helpers")]
+
 use renderer::film::{Aov, Counters, SplatSums, TileSums};
 use renderer::integrator::IntegratorKind;
 use renderer::job::{Merger, PassPlan, Planner, RenderOptions, RenderSettings, Unit, UnitKind, UnitResult};
@@ -186,7 +188,7 @@ fn a_saved_merger_goes_on_with_the_same_bits() {
 fn the_standard_error_is_that_of_the_groups() {
     // Three pixels in a row, eight groups: compare with the textbook formula on the groups' own means.
     let s = settings(IntegratorKind::Path, (3, 1), 64);
-    let mut sums = vec![[0.0f64; 3]; 8];
+    let mut sums = [[0.0f64; 3]; 8];
     let merger = run(&s, |_, unit, mut result| {
         let tile = result.tile.as_mut().unwrap();
         for (i, v) in tile.sums.iter_mut().enumerate() {

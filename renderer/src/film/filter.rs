@@ -36,6 +36,12 @@ pub struct Footprint {
 }
 
 impl Footprint {
+    /// Whether no pixel is covered.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.count[0] == 0 || self.count[1] == 0
+    }
+
     /// (x, y, weight) of each pixel; weights are per pixel area.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (u32, u32, f32)> + '_ {

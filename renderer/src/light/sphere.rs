@@ -1,5 +1,6 @@
 //! Sampling a sphere by the solid angle it covers.
 
+use crate::math::rounding::gamma;
 use crate::math::{Frame, Vec2, Vec3, sin_cos};
 use std::f64::consts::PI;
 
@@ -41,8 +42,11 @@ impl Sphere {
     fn cone(&self, p: Vec3) -> Option<Cone> {
         let to_centre = self.centre.as_dvec3() - p.as_dvec3();
         let d2 = to_centre.length_squared();
-        let r2 = f64::from(self.radius) * f64::from(self.radius);
-        if !(d2 > r2) {
+        let r = f64::from(self.radius);
+        let r2 = r * r;
+        // A point of the sphere itself may lie a rounding error outside, yet see its inner side.
+        let rounding = f64::from(gamma(16) * (p.abs().max_element() + self.centre.abs().max_element() + self.radius));
+        if !(d2 > (r + rounding) * (r + rounding)) {
             return None;
         }
         let sin2_max = r2 / d2;

@@ -13,7 +13,7 @@ mod transform;
 pub use anchor::Anchor;
 pub use fns::*;
 pub use frame::Frame;
-pub use glam::{DAffine3, DMat3, DMat4, DVec2, DVec3, Vec2, Vec3};
+pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec2, Vec3};
 pub use ray::Ray;
 pub use transform::Transform;
 

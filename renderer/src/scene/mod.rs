@@ -11,8 +11,8 @@ pub use features::SceneFeatures;
 use crate::accel::Accel;
 use crate::bsdf::{Material, MaterialId, first_bad_nesting};
 use crate::diagnostics::{Diagnostics, SceneError};
-use crate::geometry::{Geometry, Interaction, Object};
-use crate::light::{BoundingSphere, Light, LightContext, LightSelector};
+use crate::geometry::{BoundingSphere, Geometry, Interaction, Object};
+use crate::light::{Light, LightContext, LightSelector};
 use crate::math::Transform;
 use crate::texture::Texture;
 use bundle::FileSource;
@@ -82,7 +82,8 @@ impl Scene {
                 Err(message) => diagnostics.error(file, shape.name.clone(), message, ""),
             }
         }
-        let geometry = Geometry::new(builder.meshes, objects);
+        let mut geometry = Geometry { meshes: builder.meshes, objects };
+        geometry.bake();
         let bounds = geometry.bounds();
         if let Err(e) = crate::camera::Camera::new(&camera, 16, 16) {
             diagnostics.error(file, "camera", format!("the camera can't be used: {e}"), "");
