@@ -41,3 +41,22 @@ fn continued_fraction(a: f64, x: f64) -> f64 {
     }
     h
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_parameter_is_a_poisson_sum() {
+        for (a, x) in [(1, 0.3f64), (3, 2.0), (3, 9.5), (12, 11.0), (30, 55.0)] {
+            let mut term = (-x).exp();
+            let mut sum = 0.0;
+            for k in 0..a {
+                sum += term;
+                term *= x / f64::from(k + 1);
+            }
+            let q = upper_gamma(f64::from(a), x);
+            assert!((q - sum).abs() < 1e-13, "Q({a}, {x}) = {q}, sum {sum}");
+        }
+    }
+}

@@ -48,6 +48,14 @@ impl Mean {
     }
 }
 
+impl FromIterator<f64> for Mean {
+    fn from_iter<T: IntoIterator<Item = f64>>(samples: T) -> Self {
+        let mut mean = Self::default();
+        samples.into_iter().for_each(|x| mean.push(x));
+        mean
+    }
+}
+
 /// What of `|d|` goes beyond `allowed`.
 fn excess(d: f64, allowed: f64) -> f64 {
     (d.abs() - allowed).max(0.0)

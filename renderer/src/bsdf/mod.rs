@@ -11,11 +11,20 @@
 //! A new BSDF is one file (the type, `resolve`, [`Model`] with its examples) and one entry of the list below. The entry's fields
 //! are what a scene describes; the type is what they come to at one point. The statistical tests draw from the same list.
 
+mod conductor;
+mod dielectric;
+pub mod fresnel;
+mod gltf;
 mod lambert;
+mod microfacet;
 mod resolve;
 mod shading;
 
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use gltf::Gltf;
 pub use lambert::Lambert;
+pub use microfacet::{Microfacet, SMOOTH_ALPHA};
 pub use shading::{DirectionSample, MAX_NESTING, ShadingPoint, first_bad_nesting};
 
 use crate::math::{Vec2, Vec3};
@@ -149,7 +158,7 @@ macro_rules! bsdfs {
             fn resolve(&self, at: &At) -> Option<Bsdf> {
                 match *self {
                     $(Self::$name { $($field),* } => Some(Bsdf::$name($name::resolve(at, $($field),*))),)*
-                    _ => None,
+                    Self::TwoSided { .. } | Self::NormalMap { .. } => None,
                 }
             }
         }
@@ -208,8 +217,6 @@ bsdfs! {
             /// Albedo in [0, 1].
             reflectance: RgbParam,
         }
-    }
-    wrappers {
         /// Metal; black from behind.
         Conductor {
             /// Real index of refraction, relative to the outside.
@@ -220,7 +227,7 @@ bsdfs! {
             reflectance: RgbParam,
             /// `None` = a smooth mirror.
             roughness: Option<Roughness>,
-        },
+        }
         /// Glass, water: reflects and refracts.
         Dielectric {
             /// Index inside (below the surface) over index outside.
@@ -231,7 +238,7 @@ bsdfs! {
             transmittance: RgbParam,
             /// `None` = smooth.
             roughness: Option<Roughness>,
-        },
+        }
         /// glTF metallic-roughness with KHR_materials_ior and KHR_materials_transmission; both sides.
         Gltf {
             /// Base colour.
@@ -246,7 +253,9 @@ bsdfs! {
             transmission: FloatParam,
             /// Thin-walled: transmission does not refract (no KHR_materials_volume thickness).
             thin: bool,
-        },
+        }
+    }
+    wrappers {
         /// Another material on each side; seen from behind, the back material's front is seen.
         TwoSided {
             /// Where `dot(wo, ns) > 0`.

@@ -1,0 +1,178 @@
+//! Microfacet normal distributions with Smith shadowing, drawn by visible normals.
+
+use super::Distribution;
+use crate::math::{Vec2, Vec3, erf, erf64, exp, exp64, ln, safe_sqrt, sin_cos, sqr};
+use std::f32::consts::PI;
+use std::f64::consts::FRAC_2_SQRT_PI;
+
+/// Surfaces whose larger alpha is below this are treated as smooth: f32 directions can't resolve so narrow a lobe.
+pub const SMOOTH_ALPHA: f32 = 1e-3;
+
+/// The smaller alpha of a rough anisotropic surface is kept above this.
+const MIN_ALPHA: f32 = 1e-4;
+
+/// A distribution of facet normals. Masking and shadowing are Smith's, uncorrelated (their product), as in Walter et al. 2007.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Microfacet {
+    distribution: Distribution,
+    alpha: Vec2,
+}
+
+impl Microfacet {
+    /// `None` when both alphas are below [`SMOOTH_ALPHA`].
+    pub fn new(distribution: Distribution, alpha_u: f32, alpha_v: f32) -> Option<Self> {
+        let alpha = Vec2::new(alpha_u, alpha_v);
+        (alpha.max_element() >= SMOOTH_ALPHA).then(|| Self { distribution, alpha: alpha.max(Vec2::splat(MIN_ALPHA)) })
+    }
+
+    /// Density of facet normals `wm` (upper hemisphere, unit) per solid angle and projected area.
+    #[inline]
+    pub fn d(&self, wm: Vec3) -> f32 {
+        let slope2 = sqr(wm.x / self.alpha.x) + sqr(wm.y / self.alpha.y);
+        let z2 = sqr(wm.z);
+        let scale = PI * self.alpha.x * self.alpha.y;
+        match self.distribution {
+            Distribution::Ggx => 1.0 / (scale * sqr(slope2 + z2)),
+            Distribution::Beckmann if wm.z > 1e-6 => exp(-slope2 / z2) / (scale * sqr(z2)),
+            Distribution::Beckmann => 0.0,
+        }
+    }
+
+    /// Smith's masking `G1(w)` over `|cos w|`, on either side; finite at grazing angles.
+    ///
+    /// Facets turned away from `w` are the caller's to refuse.
+    #[inline]
+    pub fn g1_over_cos(&self, w: Vec3) -> f32 {
+        let z = w.z.abs();
+        let s2 = sqr(w.x * self.alpha.x) + sqr(w.y * self.alpha.y);
+        match self.distribution {
+            Distribution::Ggx => 2.0 / (z + (sqr(z) + s2).sqrt()),
+            Distribution::Beckmann => {
+                let s = s2.sqrt();
+                let a = z / s;
+                // From a = 4 on, G1 = 1 to all digits of f32.
+                if !(a < 4.0) {
+                    return 1.0 / z;
+                }
+                2.0 / (z * (1.0 + erf(a)) + s * exp(-sqr(a)) * (0.5 * FRAC_2_SQRT_PI as f32))
+            }
+        }
+    }
+
+    /// Draws a facet normal (upper hemisphere) among those that `w` sees, from either side of the surface. Its density per
+    /// solid angle is `g1_over_cos(w) |w.wm| d(wm)`.
+    #[inline]
+    pub fn sample_visible(&self, w: Vec3, u: Vec2) -> Vec3 {
+        // Stretch to alpha = 1.
+        let w = if w.z < 0.0 { -w } else { w };
+        let stretched = Vec3::new(w.x * self.alpha.x, w.y * self.alpha.y, w.z).normalize();
+        let wm = match self.distribution {
+            Distribution::Ggx => sample_visible_ggx(stretched, u),
+            Distribution::Beckmann => sample_visible_beckmann(stretched, u),
+        };
+        // Unstretch the normal.
+        Vec3::new(wm.x * self.alpha.x, wm.y * self.alpha.y, wm.z).normalize()
+    }
+}
+
+/// The facet normal (upper hemisphere) that mirrors `wo` into `wi` on the same side; `None` where f32 can't tell.
+#[inline]
+pub fn reflecting_facet(wo: Vec3, wi: Vec3) -> Option<Vec3> {
+    let h = wo + wi;
+    let length2 = h.length_squared();
+    (length2 > 0.0).then(|| h * (1.0f32.copysign(h.z) / length2.sqrt()))
+}
+
+/// The facet normal (upper hemisphere) that refracts `wo` into `wi`, and its Jacobian `|d wm / d wi| / |wi.wm|`; `eta` =
+/// index on the side of `wi` over that on the side of `wo`. `None` when no facet that both see does.
+#[inline]
+pub fn refracting_facet(wo: Vec3, wi: Vec3, eta: f32) -> Option<(Vec3, f32)> {
+    let h = wi * eta + wo;
+    let length2 = h.length_squared();
+    let wm = h * (1.0f32.copysign(h.z) / length2.sqrt());
+    let seen = length2 > 0.0 && wo.dot(wm) * wo.z > 0.0 && wi.dot(wm) * wi.z > 0.0;
+    // Walter's denominator, eta (wi.wm) + wo.wm, is the length of h.
+    seen.then(|| (wm, sqr(eta) / length2))
+}
+
+/// Visible normal of the unit-roughness GGX distribution, not of unit length: a spherical cap around `-w` shifted by `w` (Dupuy
+/// and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps").
+#[inline]
+fn sample_visible_ggx(w: Vec3, u: Vec2) -> Vec3 {
+    // z of the normal, and with it that of the cap's point without cancellation.
+    let z = (1.0 - u.y) * (1.0 + w.z);
+    let cap_z = z - w.z;
+    let (sin, cos) = sin_cos(2.0 * PI * u.x);
+    let r = safe_sqrt((1.0 - cap_z) * (1.0 + cap_z));
+    Vec3::new(r * cos + w.x, r * sin + w.y, z)
+}
+
+/// Visible normal of the unit-roughness Beckmann distribution, not of unit length.
+///
+/// Slopes along `w` have the density `(1 - x tan) exp(-x^2)` below `cot`, those across it `exp(-y^2)` (Heitz and d'Eon 2014);
+/// the first is inverted numerically in the variable `erf(x)`, where its cumulative function is almost a parabola (Jakob 2014).
+fn sample_visible_beckmann(w: Vec3, u: Vec2) -> Vec3 {
+    const INV_SQRT_PI: f64 = 0.5 * FRAC_2_SQRT_PI;
+    let sin = safe_sqrt(sqr(w.x) + sqr(w.y));
+    let across = erf_inverse(f64::from(2.0 * u.y - 1.0));
+    let Some(phi) = (sin > 0.0).then(|| Vec2::new(w.x, w.y) / sin) else {
+        return Vec3::new(-erf_inverse(f64::from(2.0 * u.x - 1.0)) as f32, -across as f32, 1.0);
+    };
+    let cot = f64::from(w.z) / f64::from(sin);
+    let tan = if cot > 1e-7 { 1.0 / cot } else { 1e7 };
+    // Solve cumulative(z) = u, z = erf(x), by Newton steps that bisect when they leave the bracket.
+    let (mut low, mut high) = (-1.0f64, erf64(cot));
+    let cumulative = |z: f64, x: f64| 1.0 + z + INV_SQRT_PI * tan * exp64(-x * x);
+    let target = f64::from(u.x) * cumulative(high, cot);
+    let mut z = low + (high - low) * f64::from(u.x);
+    for _ in 0..40 {
+        let x = erf_inverse(z);
+        let error = cumulative(z, x) - target;
+        if error > 0.0 {
+            high = z
+        } else {
+            low = z
+        }
+        let step = error / (1.0 - x * tan);
+        let next = if z - step > low && z - step < high { z - step } else { 0.5 * (low + high) };
+        let change = (next - z).abs();
+        z = next;
+        if !(change > 1e-7 * (1.0 - z.abs())) {
+            break;
+        }
+    }
+    // Turn the slopes into the plane of w.
+    let (along, across) = (erf_inverse(z) as f32, across as f32);
+    Vec3::new(-(phi.x * along - phi.y * across), -(phi.y * along + phi.x * across), 1.0)
+}
+
+/// Inverse of the error function (Giles 2010, "Approximating the erfinv function", single precision). Values stay within +-3.8:
+/// what is cut off has a probability of 1e-7.
+fn erf_inverse(x: f64) -> f64 {
+    let x = x.clamp(-1.0 + 1e-7, 1.0 - 1e-7);
+    let w = -ln(((1.0 - x) * (1.0 + x)) as f32);
+    const CENTRE: [f32; 9] = [
+        2.810_226_4e-8,
+        3.432_739_4e-7,
+        -3.523_387_7e-6,
+        -4.391_506_5e-6,
+        2.185_808_7e-4,
+        -1.253_725_1e-3,
+        -4.177_681_6e-3,
+        2.466_407_3e-1,
+        1.501_409_4,
+    ];
+    const TAILS: [f32; 9] = [
+        -2.002_142_6e-4,
+        1.009_505_6e-4,
+        1.349_343_2e-3,
+        -3.673_428_4e-3,
+        5.739_507_7e-3,
+        -7.622_461_3e-3,
+        9.438_870_5e-3,
+        1.001_674,
+        2.832_976_8,
+    ];
+    let (coefficients, t) = if w < 5.0 { (&CENTRE, w - 2.5) } else { (&TAILS, w.sqrt() - 3.0) };
+    f64::from(coefficients.iter().fold(0.0, |p, c| p * t + c)) * x
+}
