@@ -148,7 +148,7 @@ fn light_tracing_and_path_tracing_make_the_same_image() {
         // Pixel by pixel: at most a share of pixels that chance explains lies beyond its 99.9 % interval.
         let t = common::t999(8);
         let outside = (0..path.mean.len()).filter(|&i| {
-            let se = (path.std_error[i][1].powi(2) + light.std_error[i][1].powi(2)).sqrt();
+            let se = (renderer::math::sqr(path.std_error[i][1]) + renderer::math::sqr(light.std_error[i][1])).sqrt();
             f64::from((path.mean[i][1] - light.mean[i][1]).abs()) > t * f64::from(se)
         });
         let outside = outside.count();
