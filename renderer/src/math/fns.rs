@@ -31,6 +31,8 @@ pinned! {
     cos, cos64 = cosf, cos;
     /// Tangent of an angle in radians.
     tan, tan64 = tanf, tan;
+    /// Arc tangent.
+    atan, atan64 = atanf, atan;
     /// Natural exponential.
     exp, exp64 = expf, exp;
     /// Natural logarithm.

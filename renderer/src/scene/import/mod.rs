@@ -1,16 +1,35 @@
 //! Importers: glTF, lightfarm TOML and Mitsuba XML to a [`SceneDesc`].
 
 pub mod image;
+mod importer;
+mod mesh_file;
+mod metals;
+mod mitsuba;
+mod number;
+mod obj;
+mod ply;
+#[cfg(test)]
+mod tests;
+mod transform;
 
 use super::bundle::FileSource;
 use super::desc::SceneDesc;
 use crate::diagnostics::{Diagnostics, SceneError};
+use importer::Importer;
 
 /// Loads the scene file `root` of `files`; the kind is told by its extension. All errors are collected; warnings come back beside
 /// the scene.
 pub fn load(files: &dyn FileSource, root: &str) -> Result<(SceneDesc, Diagnostics), SceneError> {
-    let mut diagnostics = Diagnostics::default();
-    let _ = files;
-    diagnostics.error(root, "", "the kind of scene file can't be told from its name", "use .gltf, .glb, .toml or .xml");
-    Err(SceneError(diagnostics.list))
+    let extension = root.rsplit_once('.').map_or("", |(_, e)| e).to_ascii_lowercase();
+    let mut importer = Importer::new(files);
+    match extension.as_str() {
+        "xml" => mitsuba::import(&mut importer, root),
+        _ => {
+            let mut diagnostics = Diagnostics::default();
+            let message = "the kind of scene file can't be told from its name";
+            diagnostics.error(root, "", message, "use .gltf, .glb, .toml or .xml");
+            return Err(SceneError(diagnostics.list));
+        }
+    }
+    importer.finish()
 }
