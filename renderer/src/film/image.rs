@@ -95,49 +95,65 @@ impl MergedImage {
     }
 }
 
-/// Per group: its share of the relative squared error and its image mean.
+/// Per group: its share of the relative squared error, and how far it moves the image mean.
 struct GroupScatter {
     squared: Vec<f64>,
-    mean: Vec<f64>,
-    weight: Vec<f64>,
+    moves: Vec<f64>,
+    present: Vec<bool>,
+    mean: f64,
+    /// Pixels with at least two groups, times three channels.
+    terms: f64,
 }
 
 impl GroupScatter {
     fn new(groups: usize) -> Self {
-        Self { squared: vec![0.0; groups], mean: vec![0.0; groups], weight: vec![0.0; groups] }
+        Self {
+            squared: vec![0.0; groups],
+            moves: vec![0.0; groups],
+            present: vec![false; groups],
+            mean: 0.0,
+            terms: 0.0,
+        }
     }
 
     fn add(&mut self, values: &[(usize, ([f64; 3], f64))], mean: &[f64; 3], n: f64) {
-        let g = values.len() as f64;
+        let count = values.len() as f64;
+        self.mean += mean.iter().sum::<f64>();
+        if values.len() < 2 {
+            return;
+        }
+        self.terms += 3.0;
         for (group, (v, n_g)) in values {
+            self.present[*group] = true;
             for c in 0..3 {
                 let d = v[c] - mean[c];
-                if g > 1.0 {
-                    self.squared[*group] += n_g * d * d * g / ((g - 1.0) * n * (mean[c] * mean[c] + 0.01));
-                }
-                self.mean[*group] += v[c];
+                self.squared[*group] += n_g * d * d / ((count - 1.0) * n * (mean[c] * mean[c] + 0.01));
+                self.moves[*group] += n_g * d / n;
             }
-            self.weight[*group] += n_g;
         }
     }
 
-    /// The relative squared error is the mean over groups of `squared`; the groups' spread gives its interval.
+    /// Both errors are sums over groups; the spread of the summands tells how well the first is known, and is the second.
     fn summary(&self, pixels: usize) -> Option<ErrorSummary> {
-        let used: Vec<usize> = (0..self.weight.len()).filter(|&g| self.weight[g] > 0.0).collect();
-        let count = used.len() as f64;
-        if used.len() < 2 {
+        let used: Vec<usize> = (0..self.present.len()).filter(|&g| self.present[g]).collect();
+        if self.terms == 0.0 {
             return None;
         }
-        let terms = 3.0 * pixels as f64;
-        let moments = |values: &[f64]| {
-            let mean = used.iter().map(|&g| values[g]).sum::<f64>() / count / terms;
-            let spread: f64 = used.iter().map(|&g| (values[g] / terms - mean) * (values[g] / terms - mean)).sum();
-            (mean, (spread / (count - 1.0) / count).sqrt())
-        };
-        let (squared, squared_se) = moments(&self.squared);
-        let (mean, mean_se) = moments(&self.mean);
-        let upper = squared + t95_one_sided(used.len() - 1) * squared_se;
-        Some(ErrorSummary { relative: squared.sqrt(), upper95: upper.sqrt(), mean, mean_se, groups: used.len() as u32 })
+        let all = 3.0 * pixels as f64;
+        let count = used.len() as f64;
+        let sum_of_squares =
+            |f: &dyn Fn(usize) -> f64| used.iter().map(|&g| f(g) * f(g)).sum::<f64>() * count / (count - 1.0);
+        let squared = self.squared.iter().sum::<f64>() / self.terms;
+        let squared_se = sum_of_squares(&|g| self.squared[g] / self.terms - squared / count).sqrt();
+        let mean_se = sum_of_squares(&|g| self.moves[g] / all).sqrt();
+        let upper = squared + t95_one_sided(count as usize - 1) * squared_se;
+        Some(ErrorSummary {
+            relative: squared.sqrt(),
+            upper95: upper.sqrt(),
+            mean: self.mean / all,
+            mean_se,
+            groups: count as u32,
+        })
     }
 }
 

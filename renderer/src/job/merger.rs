@@ -85,10 +85,8 @@ impl Merger {
         }
         self.fold_any(unit, result)?;
         self.next += 1;
-        if self.plan.last
-            && let Some(group) = self.plan.ends_group(unit)
-        {
-            self.groups[group as usize].close(self.settings.width as usize * self.settings.height as usize);
+        if let Some(group) = self.plan.ends_group(unit).filter(|g| g.closes) {
+            self.groups[group.replicate as usize].close(self.settings.width as usize * self.settings.height as usize);
         }
         Ok(())
     }

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// Samples (or light paths) that one unit aims at: some tens of milliseconds of work.
 const UNIT_SAMPLES: u64 = 1 << 16;
+/// Most samples per pixel of a job.
+const MAX_SPP: u32 = 1 << 24;
 
 /// The samples of one replicate group in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,6 +20,8 @@ pub struct GroupRange {
     pub start: u32,
     /// One past the last.
     pub end: u32,
+    /// The group gets no samples after these.
+    pub closes: bool,
 }
 
 /// The plan of one pass: a pure function of the settings and of what the passes before it merged to. Its units follow from it by
@@ -33,11 +37,11 @@ pub struct PassPlan {
     pub height: u32,
     /// Whether units are light paths over the whole film rather than tiles.
     pub splats: bool,
-    /// What each group renders, in the order of the units. Sample ranges differ by at most one in length.
+    /// What each group renders, in the order of the units.
     pub groups: Vec<GroupRange>,
     /// Plan constant: selection weights of the lights, learned from earlier passes; empty = by power.
     pub light_weights: Vec<f32>,
-    /// No group gets samples after this pass.
+    /// The job ends with this pass.
     pub last: bool,
 }
 
@@ -118,13 +122,13 @@ impl PassPlan {
         UnitKind::Tile { rect, start, end: (start + 256).min(g.end) }
     }
 
-    /// Whether unit `id` is the last of its group in this pass.
-    pub fn ends_group(&self, id: u32) -> Option<u32> {
+    /// The group whose last unit of this pass is `id`.
+    pub fn ends_group(&self, id: u32) -> Option<&GroupRange> {
         let mut end = 0;
         for g in &self.groups {
             end += self.units_of(g);
             if u64::from(id) + 1 == end {
-                return Some(g.replicate);
+                return Some(g);
             }
         }
         None
@@ -143,44 +147,78 @@ impl Planner {
         Self { settings }
     }
 
-    /// The first pass: a sample or a few per group, so that there is a preview (and a pilot) soon.
+    /// The first pass: small, so that there is a preview (and a pilot) soon.
+    ///
+    /// A budget in samples is worked off group after group, so that few films are open at once. Its first pass is one sample per pixel
+    /// of the first group; a tracer from the lights, which learns from its pilot, does an eighth of its groups first.
     pub fn first(&self) -> PassPlan {
-        let splats = self.settings.integrator == IntegratorKind::Light;
-        let pilot = match self.settings.budget.spp {
-            // A tracer from the lights learns from its pilot: an eighth of the budget.
-            Some(n) if splats => (n / 8).max(self.settings.replicates).min(n),
-            Some(n) => self.settings.replicates.min(n),
-            None => self.settings.replicates,
+        let Some(spp) = self.sample_budget() else { return self.pass(0, 0, self.settings.replicates, Vec::new()) };
+        let groups = self.shares(spp);
+        let first = if self.splats() {
+            groups[..(groups.len() / 8).max(1)].to_vec()
+        } else if groups[0].end > 1 {
+            vec![GroupRange { end: 1, closes: false, ..groups[0] }]
+        } else {
+            groups.clone()
         };
-        self.pass(0, 0, pilot, Vec::new())
+        let last = first == groups;
+        self.plan(0, first, Vec::new(), last)
     }
 
     /// The pass after one that ended at `done` samples per pixel in all; `None` when the sample budget is used up.
     pub fn next(&self, pass: u32, done: u32, light_weights: Vec<f32>) -> Option<PassPlan> {
-        let b = &self.settings.budget;
-        let left = b.spp.map(|n| n.saturating_sub(done));
-        let size = if b.time_s.is_none() && b.target_error.is_none() {
-            left?
-        } else {
-            // A tenth of what is done, in whole samples per group: passes stay below a tenth of a time budget, and checkpoints
-            // are declared before anything is measured.
-            let g = self.settings.replicates;
-            (done / 10 / g * g).max(g).min(left.unwrap_or(u32::MAX)).min((1 << 24) - done.min(1 << 24))
-        };
+        if let Some(spp) = self.sample_budget() {
+            let groups = self.shares(spp);
+            let rest = if self.splats() {
+                groups[(groups.len() / 8).max(1)..].to_vec()
+            } else {
+                let mut rest = groups;
+                rest[0].start = 1;
+                rest
+            };
+            return (pass == 1).then(|| self.plan(pass, rest, light_weights, true));
+        }
+        // A tenth of what is done, in whole samples per group: passes stay below a tenth of a time budget, and checkpoints are
+        // declared before anything is measured.
+        let g = self.settings.replicates;
+        let left = self.settings.budget.spp.map_or(MAX_SPP, |n| n.min(MAX_SPP)).saturating_sub(done);
+        let size = (done / 10 / g * g).max(g).min(left);
         (size > 0).then(|| self.pass(pass, done, size, light_weights))
+    }
+
+    /// The samples per pixel of a job that nothing but their number ends.
+    fn sample_budget(&self) -> Option<u32> {
+        let b = &self.settings.budget;
+        b.spp.filter(|_| b.time_s.is_none() && b.target_error.is_none())
+    }
+
+    fn splats(&self) -> bool {
+        self.settings.integrator == IntegratorKind::Light
+    }
+
+    /// What each group renders of a whole sample budget.
+    fn shares(&self, spp: u32) -> Vec<GroupRange> {
+        let g = self.settings.replicates;
+        (0..g)
+            .map(|r| GroupRange { replicate: r, start: 0, end: spp / g + u32::from(r < spp % g), closes: true })
+            .filter(|r| r.end > 0)
+            .collect()
     }
 
     /// Samples `from .. from + size` of the job, dealt to the groups as evenly as can be.
     fn pass(&self, pass: u32, from: u32, size: u32, light_weights: Vec<f32>) -> PassPlan {
-        let s = &self.settings;
-        let g = s.replicates;
+        let g = self.settings.replicates;
         let upto = |total: u32, r: u32| total / g + u32::from(r < total % g);
         let groups = (0..g)
-            .map(|r| GroupRange { replicate: r, start: upto(from, r), end: upto(from + size, r) })
+            .map(|r| GroupRange { replicate: r, start: upto(from, r), end: upto(from + size, r), closes: false })
             .filter(|r| r.end > r.start)
             .collect();
-        let last = s.budget.spp == Some(from + size);
-        let splats = s.integrator == IntegratorKind::Light;
-        PassPlan { pass, width: s.width, height: s.height, splats, groups, light_weights, last }
+        let last = self.settings.budget.spp.is_some_and(|n| from + size >= n);
+        self.plan(pass, groups, light_weights, last)
+    }
+
+    fn plan(&self, pass: u32, groups: Vec<GroupRange>, light_weights: Vec<f32>, last: bool) -> PassPlan {
+        let (width, height) = (self.settings.width, self.settings.height);
+        PassPlan { pass, width, height, splats: self.splats(), groups, light_weights, last }
     }
 }

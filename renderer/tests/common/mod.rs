@@ -77,11 +77,7 @@ pub fn render_with(scene: &Scene, settings: &RenderSettings, threads: usize) -> 
 
 /// Two-sided 99.9 % Student's t for the number of groups.
 pub fn t999(groups: u32) -> f64 {
-    match groups {
-        8 => 5.408,
-        16 => 4.073,
-        _ => panic!("no quantile for {groups} groups"),
-    }
+    statcheck::student_quantile(1.0 - 0.0005, f64::from(groups - 1))
 }
 
 /// The image mean must be `truth` within its 99.9 % interval, whose half width must be below `share` of it.
