@@ -11,6 +11,8 @@
 //! raster position, is an estimate of pixel j itself, whatever the resolution.
 
 mod desc;
+#[cfg(test)]
+mod tests;
 
 pub use desc::{CameraDesc, FovAxis};
 

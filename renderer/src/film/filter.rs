@@ -173,3 +173,154 @@ fn profile(desc: &FilterDesc, t: f64) -> f64 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{IndependentSampler, Sampler};
+    use statcheck::{chi2_test, sidak};
+
+    const SIZE: [u32; 2] = [7, 5];
+
+    fn roster() -> Vec<(FilterDesc, Filter)> {
+        [
+            FilterDesc::Box { radius: 0.5 },
+            FilterDesc::Box { radius: 0.25 },
+            FilterDesc::Box { radius: 1.375 },
+            FilterDesc::Tent { radius: 1.0 },
+            FilterDesc::Tent { radius: 8.0 },
+            FilterDesc::Gaussian { stddev: 0.5 },
+            FilterDesc::Gaussian { stddev: 1.7 },
+            FilterDesc::BlackmanHarris { radius: 1.5 },
+        ]
+        .map(|desc| (desc, Filter::new(&desc, SIZE[0], SIZE[1])))
+        .to_vec()
+    }
+
+    /// `h` of a pixel at a raster position, by way of the splat weights.
+    fn h(filter: &Filter, at: Vec2, x: u32, y: u32) -> f64 {
+        filter.weights(at).iter().find(|&(i, j, _)| (i, j) == (x, y)).map_or(0.0, |(.., w)| f64::from(w))
+    }
+
+    /// Positions sampled for a pixel are distributed as the weight that they would splat into it: inside, at a border, in corners.
+    #[test]
+    fn samples_have_the_density_of_the_weights() {
+        // Histogram in quarters of a pixel; the density's integrals by the midpoint rule.
+        const FINE: u32 = 16;
+        let roster = roster();
+        let pixels = [(3, 2), (0, 2), (6, 4), (1, 0)];
+        let significance = sidak(0.01, roster.len() * pixels.len());
+        for (desc, filter) in &roster {
+            for (x, y) in pixels {
+                let (columns, rows) = (SIZE[0] as usize * 4, SIZE[1] as usize * 4);
+                let mut expected = vec![0.0; columns * rows];
+                let n = 40_000;
+                for fy in 0..SIZE[1] * 4 * FINE {
+                    for fx in 0..SIZE[0] * 4 * FINE {
+                        let at = Vec2::new(fx as f32 + 0.5, fy as f32 + 0.5) / (4 * FINE) as f32;
+                        let bin = (fy / FINE) as usize * columns + (fx / FINE) as usize;
+                        expected[bin] += h(filter, at, x, y) * f64::from(n) / f64::from(16 * FINE * FINE);
+                    }
+                }
+                let total: f64 = expected.iter().sum();
+                assert!((total / f64::from(n) - 1.0).abs() < 1e-3, "{desc:?}, pixel {x} {y}: {total}");
+                let mut observed = vec![0.0; columns * rows];
+                let mut s = IndependentSampler::new([30, u64::from(x)]);
+                for _ in 0..n {
+                    let at = filter.sample(s.next_2d(), x, y);
+                    assert!(at.x >= 0.0 && at.x < SIZE[0] as f32 && at.y >= 0.0 && at.y < SIZE[1] as f32);
+                    observed[(at.y * 4.0) as usize * columns + (at.x * 4.0) as usize] += 1.0;
+                }
+                let chi2 = chi2_test(&observed, &expected);
+                assert!(chi2.p > significance, "{desc:?}, pixel {x} {y}: {chi2:?}");
+            }
+        }
+    }
+
+    /// Along one axis, with a fine midpoint rule: every pixel's weight integrates to one over the picture.
+    #[test]
+    fn weights_integrate_to_one() {
+        const STEPS: u32 = 20_000;
+        for (desc, filter) in roster() {
+            let mut sums = vec![0.0; SIZE[0] as usize];
+            for i in 0..STEPS {
+                let x = SIZE[0] as f32 * (i as f32 + 0.5) / STEPS as f32;
+                let mut weights = [0.0; MAX_FOOTPRINT];
+                let (first, count) = filter.weights_axis(x, SIZE[0], &mut weights);
+                for (k, w) in weights[..count].iter().enumerate() {
+                    sums[first as usize + k] += f64::from(*w) * f64::from(SIZE[0]) / f64::from(STEPS);
+                }
+            }
+            // Only the jumps of a box keep the rule from more digits.
+            let tolerance = if matches!(desc, FilterDesc::Box { .. }) { 2e-3 } else { 1e-5 };
+            for (x, sum) in sums.iter().enumerate() {
+                assert!((sum - 1.0).abs() < tolerance, "{desc:?}, column {x}: {sum}");
+            }
+        }
+    }
+
+    /// Box and tent tile the raster: the weights of all pixels sum to one everywhere.
+    #[test]
+    fn partitions_of_unity() {
+        let size = [20, 20];
+        for desc in [FilterDesc::Box { radius: 0.5 }, FilterDesc::Box { radius: 1.0 }, FilterDesc::Tent { radius: 1.0 }]
+        {
+            let filter = Filter::new(&desc, size[0], size[1]);
+            let mut s = IndependentSampler::new([31]);
+            for i in 0..2000 {
+                // Pixel borders and centres too.
+                let at = if i % 2 == 0 { s.next_2d() * 10.0 + 5.0 } else { (s.next_2d() * 20.0).floor() * 0.5 + 5.0 };
+                let sum: f32 = filter.weights(at).iter().map(|(.., w)| w).sum();
+                assert!((sum - 1.0).abs() < 1e-5, "{desc:?} at {at}: {sum}");
+            }
+        }
+        assert_eq!(
+            Filter::new(&FilterDesc::Box { radius: 0.5 }, 3, 3).weights(Vec2::new(2.0, 0.0)).iter().collect::<Vec<_>>(),
+            [(2, 0, 1.0)]
+        );
+    }
+
+    /// The profiles are what they are called, to the accuracy of the table.
+    #[test]
+    fn profiles() {
+        let at_centre = Vec2::splat(10.5);
+        let ratio = |desc, dx: f32| {
+            let filter = Filter::new(&desc, 21, 21);
+            h(&filter, at_centre + Vec2::X * dx, 10, 10) / h(&filter, at_centre, 10, 10)
+        };
+        for dx in [0.1f32, 0.3, 0.77, 1.4, 1.99] {
+            let x = f64::from(dx);
+            let end = libm::exp(-8.0);
+            let gaussian = (libm::exp(-2.0 * x * x) - end) / (1.0 - end);
+            assert!((ratio(FilterDesc::Gaussian { stddev: 0.5 }, dx) - gaussian).abs() < 2e-4);
+            assert!((ratio(FilterDesc::Tent { radius: 2.0 }, dx) - (1.0 - 0.5 * x)).abs() < 1e-5);
+            let a = std::f64::consts::PI * x / 2.0;
+            let window = 0.35875 + 0.48829 * libm::cos(a) + 0.14128 * libm::cos(2.0 * a) + 0.01168 * libm::cos(3.0 * a);
+            assert!((ratio(FilterDesc::BlackmanHarris { radius: 2.0 }, dx) - window).abs() < 2e-4);
+        }
+    }
+
+    /// Sampling keeps order, so that stratified numbers give stratified positions.
+    #[test]
+    fn monotone() {
+        for (desc, filter) in roster() {
+            for x in [0, 3, 6] {
+                let mut last = 0.0;
+                for i in 0..4096 {
+                    let at = filter.sample(Vec2::splat(i as f32 / 4096.0), x, 2).x;
+                    assert!(at >= last, "{desc:?}: {last} {at}");
+                    last = at;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_outside() {
+        for (_, filter) in roster() {
+            for at in [Vec2::new(-0.01, 2.0), Vec2::new(7.0, 2.0), Vec2::new(1.0, f32::NAN), Vec2::new(1e30, 1.0)] {
+                assert_eq!(filter.weights(at).iter().count(), 0);
+            }
+        }
+    }
+}

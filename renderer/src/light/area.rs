@@ -76,16 +76,17 @@ impl AreaLight {
     fn sample_sphere(&self, ctx: &LightContext, p: Vec3, u: Vec2) -> Option<Option<LiSample>> {
         let sphere = self.sphere?;
         let s = sphere.sample(p, u)?;
+        let n = (s.offset / f64::from(sphere.radius)).as_vec3();
         let flip = ctx.geometry.objects[self.object.0 as usize].flip_normals;
-        let ng = if flip { -s.n } else { s.n };
+        let ng = if flip { -n } else { n };
         if !self.emits_towards(ng, -s.wi) || !s.pdf.is_finite() {
             return Some(None);
         }
-        let point = (sphere.centre.as_dvec3() + s.n.as_dvec3() * f64::from(sphere.radius)).as_vec3();
+        let point = (sphere.centre.as_dvec3() + s.offset).as_vec3();
         let light = Anchor { p: point, p_error: point.abs() * gamma(2), ng };
         let radiance = match self.radiance {
             RgbParam::Const(radiance) => radiance,
-            RgbParam::Texture(..) => self.radiance_at(ctx, self.sphere_uv(ctx, sphere, s.n)),
+            RgbParam::Texture(..) => self.radiance_at(ctx, self.sphere_uv(ctx, sphere, n)),
         };
         Some(Some(LiSample { wi: s.wi, dist: s.dist, radiance, pdf: s.pdf, delta: false, light }))
     }
@@ -167,6 +168,17 @@ impl Emitter for AreaLight {
         };
         let sides = if self.two_sided { 2.0 } else { 1.0 };
         mean * (PI * self.area * sides)
+    }
+
+    #[cfg(test)]
+    fn examples() -> Vec<super::tests::Example> {
+        super::tests::emitters()
+            .into_iter()
+            .map(|(name, geometry, textures, emission)| {
+                let light = Self::new(&geometry, ObjectId(0), &emission).unwrap().into();
+                super::tests::Example { name, geometry, textures, light }
+            })
+            .collect()
     }
 }
 

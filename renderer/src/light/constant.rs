@@ -49,4 +49,9 @@ impl Emitter for ConstantLight {
     fn power(&self, ctx: &LightContext) -> Rgb {
         self.radiance * (4.0 * PI * disk_area(&ctx.bounds))
     }
+
+    #[cfg(test)]
+    fn examples() -> Vec<super::tests::Example> {
+        vec![super::tests::Example::free("constant", Self { radiance: Rgb::new(0.5, 1.0, 2.0) }.into())]
+    }
 }

@@ -55,4 +55,10 @@ impl Emitter for DirectionalLight {
     fn power(&self, ctx: &LightContext) -> Rgb {
         self.irradiance * disk_area(&ctx.bounds)
     }
+
+    #[cfg(test)]
+    fn examples() -> Vec<super::tests::Example> {
+        let light = Self { direction: Vec3::new(0.6, -0.8, 0.0), irradiance: Rgb::new(1.0, 2.0, 3.0) };
+        vec![super::tests::Example::free("directional", light.into())]
+    }
 }

@@ -205,4 +205,15 @@ impl Emitter for EnvironmentLight {
     fn power(&self, ctx: &LightContext) -> Rgb {
         self.integral * disk_area(&ctx.bounds)
     }
+
+    #[cfg(test)]
+    fn examples() -> Vec<super::tests::Example> {
+        super::tests::environments()
+            .into_iter()
+            .map(|(name, image, to_world)| {
+                let light = Self::new(Arc::new(image), Rgb::new(1.0, 0.5, 0.25), &to_world).unwrap().unwrap();
+                super::tests::Example::free(name, light.into())
+            })
+            .collect()
+    }
 }

@@ -17,6 +17,8 @@ mod sample;
 mod select;
 mod sphere;
 mod spot;
+#[cfg(test)]
+mod tests;
 
 pub use area::AreaLight;
 pub use constant::ConstantLight;
@@ -75,6 +77,10 @@ trait Emitter {
     fn le_infinite(&self, _w: Vec3) -> Rgb {
         Rgb::ZERO
     }
+
+    /// Lights of this kind on which all the statistical tests run.
+    #[cfg(test)]
+    fn examples() -> Vec<tests::Example>;
 }
 
 macro_rules! lights {
@@ -90,6 +96,11 @@ macro_rules! lights {
                 Self::$variant(light)
             }
         })*
+
+        #[cfg(test)]
+        fn roster() -> Vec<tests::Example> {
+            [$(<$light as Emitter>::examples(),)*].into_iter().flatten().collect()
+        }
 
         impl Light {
             /// What kinds of delta distributions the light has, and whether it is infinitely far away.

@@ -62,4 +62,10 @@ impl Emitter for PointLight {
     fn power(&self, _ctx: &LightContext) -> Rgb {
         self.intensity * (4.0 * PI)
     }
+
+    #[cfg(test)]
+    fn examples() -> Vec<super::tests::Example> {
+        let light = Self { position: Vec3::new(0.3, 1.2, -0.4), intensity: Rgb::new(3.0, 2.0, 1.0) };
+        vec![super::tests::Example::free("point", light.into())]
+    }
 }

@@ -65,3 +65,48 @@ impl LightSelector {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::{IndependentSampler, Sampler};
+
+    #[test]
+    fn frequencies_are_the_probabilities() {
+        let weights = [0.0f32, 3.0, 1e-3, 0.5, f32::NAN, 8.0, -1.0, f32::INFINITY];
+        for selector in [LightSelector::new(&weights), LightSelector::defensive(&weights, 0.2)] {
+            let pmf: Vec<f64> = (0..weights.len()).map(|i| f64::from(selector.pmf(i))).collect();
+            assert!((pmf.iter().sum::<f64>() - 1.0).abs() < 1e-6);
+            let n = 200_000;
+            let (mut counts, mut rest) = (vec![0.0; weights.len()], vec![0.0; 16]);
+            let mut s = IndependentSampler::new([16]);
+            for _ in 0..n {
+                let choice = selector.sample(s.next_1d()).unwrap();
+                assert_eq!(choice.pmf, selector.pmf(choice.index));
+                counts[choice.index] += 1.0;
+                rest[(choice.u * 16.0) as usize] += 1.0;
+            }
+            let expected: Vec<f64> = pmf.iter().map(|p| p * f64::from(n)).collect();
+            assert!(statcheck::chi2_test(&counts, &expected).p > 0.001, "{counts:?} {expected:?}");
+            assert!(statcheck::chi2_test(&rest, &[f64::from(n) / 16.0; 16]).p > 0.001, "{rest:?}");
+        }
+    }
+
+    #[test]
+    fn none_one_and_left_out() {
+        assert!(LightSelector::new(&[]).sample(0.5).is_none());
+        assert!(LightSelector::new(&[0.0, f32::NAN]).is_empty());
+        let one = LightSelector::new(&[0.0, 7.0, 0.0]);
+        assert_eq!(one.sample(0.3), Some(Choice { index: 1, pmf: 1.0, u: 0.3 }));
+        assert_eq!([0, 1, 2].map(|i| one.pmf(i)), [0.0, 1.0, 0.0]);
+        // What was learned to be dark keeps its share.
+        let learned = LightSelector::defensive(&[0.0, 9.0, 1.0], 0.3);
+        for (i, pmf) in [0.1, 0.1 + 0.63, 0.1 + 0.07].into_iter().enumerate() {
+            assert!((learned.pmf(i) - pmf).abs() < 1e-6);
+        }
+        let nothing = LightSelector::defensive(&[0.0, f32::NAN], 0.3);
+        assert_eq!((nothing.pmf(0), nothing.pmf(1)), (0.5, 0.5));
+        assert!(LightSelector::defensive(&[], 0.3).is_empty());
+        assert_eq!(LightSelector::defensive(&[0.0], 0.3).pmf(0), 1.0);
+    }
+}

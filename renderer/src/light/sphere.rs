@@ -1,7 +1,7 @@
 //! Sampling a sphere by the solid angle it covers.
 
 use crate::math::rounding::gamma;
-use crate::math::{Frame, Vec2, Vec3, sin_cos};
+use crate::math::{DVec3, Frame, Vec2, Vec3, sin_cos};
 use std::f64::consts::PI;
 
 /// A sphere in the world.
@@ -15,8 +15,8 @@ pub(super) struct Sphere {
 pub(super) struct SphereSample {
     pub wi: Vec3,
     pub dist: f32,
-    /// Unit outward normal there.
-    pub n: Vec3,
+    /// The point, from the centre: on the sphere to f64 accuracy (a normal rounded to f32 would put it beside).
+    pub offset: DVec3,
     /// Per solid angle.
     pub pdf: f32,
 }
@@ -24,7 +24,7 @@ pub(super) struct SphereSample {
 /// The cone that a sphere covers, seen from a point outside. In f64: its parts differ by many orders of magnitude far away, and
 /// cancel near the surface.
 struct Cone {
-    to_centre: glam::DVec3,
+    to_centre: DVec3,
     /// Squared distance of the centre.
     d2: f64,
     r2: f64,
@@ -76,7 +76,7 @@ impl Sphere {
         // Find the near intersection; t^2 - 2 d cos t + (d^2 - r^2) = 0, its smaller root without cancellation.
         let root = (cone.r2 - cone.d2 * sin2).max(0.0).sqrt();
         let dist = (cone.d2 - cone.r2) / (d * cos + root);
-        let n = (wi * dist - cone.to_centre).normalize();
-        Some(SphereSample { wi: wi.normalize().as_vec3(), dist: dist as f32, n: n.as_vec3(), pdf: cone.pdf() as f32 })
+        let offset = (wi * dist - cone.to_centre).normalize() * f64::from(self.radius);
+        Some(SphereSample { wi: wi.normalize().as_vec3(), dist: dist as f32, offset, pdf: cone.pdf() as f32 })
     }
 }

@@ -163,6 +163,30 @@ impl Emitter for SpotLight {
         };
         self.intensity * (2.0 * PI * (self.omc_beam + ring as f32))
     }
+
+    #[cfg(test)]
+    fn examples() -> Vec<super::tests::Example> {
+        let spot = |name, beam, cutoff, falloff| {
+            let desc = LightDesc::Spot {
+                position: glam::DVec3::new(-0.2, 1.5, 0.1),
+                direction: glam::DVec3::new(0.2, -1.0, 0.3),
+                intensity: Rgb::new(3.0, 2.0, 1.0),
+                beam,
+                cutoff,
+                falloff,
+            };
+            super::tests::Example::free(name, Self::new(&desc).unwrap().unwrap().into())
+        };
+        use SpotFalloff::{LinearAngle, SquaredCosine};
+        vec![
+            spot("spot, linear angle", 20.0, 40.0, LinearAngle),
+            spot("spot, linear angle, no inner cone", 0.0, 30.0, LinearAngle),
+            spot("spot, squared cosine", 20.0, 40.0, SquaredCosine),
+            spot("spot, squared cosine, wide", 0.0, 90.0, SquaredCosine),
+            spot("spot, hard edge", 35.0, 35.0, LinearAngle),
+            spot("spot, wider than a hemisphere", 60.0, 150.0, LinearAngle),
+        ]
+    }
 }
 
 /// Integral of `(cutoff - theta) / (cutoff - beam) sin(theta)` from beam to cutoff:

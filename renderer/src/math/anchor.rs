@@ -28,13 +28,13 @@ impl Anchor {
     /// The segment to `end` (parameter 0 to 1, not of unit length), clear of both surfaces on the sides that face each other.
     ///
     /// A fixed share of the length is not enough to stay clear of the surface at `end`, and too much elsewhere. So the end is
-    /// moved along its normal by the error of the point, plus what the ray's own rounding (of origin, direction and the intersection
-    /// test, all relative to the coordinates) can move it across the surface.
+    /// moved along its normal by the error of the point, plus what the rounding of the direction and of the intersection test
+    /// (relative to the distance) can move the ray across the surface there. Measured, gamma(2) is hardly enough and gamma(4) is.
     #[inline]
     pub fn segment_to(&self, end: &Anchor) -> Ray {
         let towards = end.p - self.p;
         let o = offset_ray_origin(self.p, self.p_error, self.ng, towards);
-        let rounding = (o.abs() + end.p.abs()) * gamma(8);
+        let rounding = Vec3::splat(towards.abs().max_element() * gamma(6));
         let q = offset_ray_origin(end.p, end.p_error + rounding, end.ng, -towards);
         Ray::segment(o, q - o, 1.0)
     }
