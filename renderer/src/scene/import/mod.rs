@@ -1,5 +1,6 @@
 //! Importers: glTF, lightfarm TOML and Mitsuba XML to a [`SceneDesc`].
 
+mod gltf;
 pub mod image;
 mod importer;
 mod mesh_file;
@@ -23,6 +24,13 @@ pub fn load(files: &dyn FileSource, root: &str) -> Result<(SceneDesc, Diagnostic
     let extension = root.rsplit_once('.').map_or("", |(_, e)| e).to_ascii_lowercase();
     let mut importer = Importer::new(files);
     match extension.as_str() {
+        "gltf" | "glb" => {
+            let mut diagnostics = Diagnostics::default();
+            return match gltf::load_gltf(files, root, &mut diagnostics) {
+                Some(scene) => Ok((scene, diagnostics)),
+                None => Err(SceneError(diagnostics.list)),
+            };
+        }
         "xml" => mitsuba::import(&mut importer, root),
         _ => {
             let mut diagnostics = Diagnostics::default();
