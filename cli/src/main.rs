@@ -1,9 +1,14 @@
 //! The `lightfarm` command. This file only parses; each subcommand is a file of `commands/`.
 
 mod commands;
+mod diff;
 mod exit;
 mod options;
 mod output;
+mod pictures;
+mod preview;
+mod progress;
+mod save;
 mod scene_file;
 mod signals;
 

@@ -1,5 +1,6 @@
 //! The subcommands: one file each, one line each in [`Command`] and its `match`.
 
+mod diff;
 mod render;
 
 use crate::exit::Outcome;
@@ -11,6 +12,8 @@ use clap::Subcommand;
 pub enum Command {
     /// Plan, render and merge in this process
     Render(render::Args),
+    /// Compare a picture with a reference
+    Diff(diff::Args),
 }
 
 impl Command {
@@ -18,13 +21,14 @@ impl Command {
     pub fn run(self, console: &Console) -> Outcome {
         match self {
             Self::Render(args) => render::run(args, console),
+            Self::Diff(args) => diff::run(args, console),
         }
     }
 
     /// What is logged when `RUST_LOG` is not set: services say what they do, the others only what is wrong.
     pub fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Render(_) => "warn",
+            Self::Render(_) | Self::Diff(_) => "warn",
         }
     }
 }

@@ -3,9 +3,12 @@
 use crate::exit::{Failure, Outcome};
 use crate::options::{OutputArgs, RenderArgs, ThreadArgs};
 use crate::output::Console;
-use crate::scene_file;
-use crate::signals;
-use renderer::job::{LocalOptions, RenderSettings, Stop, render_local};
+use crate::pictures::{Pictures, Summary};
+use crate::preview::Preview;
+use crate::progress::{Moment, Progress};
+use crate::{scene_file, signals};
+use renderer::job::{LocalEvent, LocalOptions, LocalOutcome, Merger, RenderSettings, Stop, UnitError, render_local};
+use renderer::scene::Scene;
 use std::path::PathBuf;
 
 /// What to render and where to put it.
@@ -25,19 +28,71 @@ static STOP: Stop = Stop::new();
 
 /// Runs it.
 pub fn run(args: Args, console: &Console) -> Outcome {
-    let (exr, png) = args.output.paths(&args.scene)?;
     signals::stop_on_interrupt(&STOP)
-        .map_err(|e| Failure::Machine(format!("the handlers of signals can't be installed: {e}")))?;
+        .map_err(|e| Failure::Machine(format!("error: the handlers of signals can't be installed: {e}")))?;
+    let pictures = Pictures::new(&args.output, &args.scene)?;
+    pictures.check()?;
     let loaded = scene_file::load(&args.scene, console)?;
     let settings = RenderSettings::resolve(&args.render.to_options(), &loaded.scene.defaults)
-        .map_err(|e| Failure::Input(e.to_string()))?;
+        .map_err(|e| Failure::Input(format!("error: {e}")))?;
     let (manifest, _) = loaded.files.into_bundle(loaded.root);
     let options = LocalOptions { threads: args.threads.count() };
-    let outcome = render_local(&loaded.scene, &settings, &options, &STOP, &mut |_| {})
-        .map_err(|e| Failure::Machine(e.to_string()))?;
-    console.result(
-        format!("{} x {} pixels: {}, {}", settings.width, settings.height, exr.display(), png.display()),
-        &serde_json::json!({"event": "done", "scene": manifest.digest(), "exr": exr, "png": png}),
-    );
-    if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
+    let mut session = Session { progress: Progress::new(console), pictures: &pictures, settings: &settings };
+    let (outcome, first_preview) = session.render(&loaded.scene, &options);
+    session.progress.finish();
+    let seconds = session.progress.seconds();
+    let outcome = outcome.map_err(|e| Failure::Machine(format!("error: {e}")))?;
+    if outcome.image.counters.samples == 0 {
+        console.note("nothing was finished: no picture is written");
+        return Err(Failure::Interrupted);
+    }
+    let saved = pictures.save(&outcome.image, &settings.provenance(manifest.digest()))?;
+    let summary = Summary::new(&outcome, &settings, manifest.digest(), seconds, &saved);
+    let summary = summary.with_first_preview(first_preview);
+    console.result(&summary, &summary);
+    match saved.failure {
+        Some(failure) => Err(failure),
+        None if outcome.interrupted => Err(Failure::Interrupted),
+        None => Ok(()),
+    }
+}
+
+/// A render with progress and previews.
+struct Session<'a> {
+    progress: Progress,
+    pictures: &'a Pictures,
+    settings: &'a RenderSettings,
+}
+
+impl Session<'_> {
+    /// Renders; also tells when the first preview was on disk, in seconds.
+    fn render(&mut self, scene: &Scene, options: &LocalOptions) -> (Result<LocalOutcome, UnitError>, Option<f64>) {
+        let mut preview = Preview::new(self.pictures.png.clone(), self.pictures.exposure);
+        let (mut broken, mut first) = (false, None);
+        let outcome = render_local(scene, self.settings, options, &STOP, &mut |event| {
+            let (LocalEvent::Progress(merger) | LocalEvent::PassDone(merger)) = event;
+            if !broken {
+                match preview.update(merger) {
+                    Ok(true) => drop(first.get_or_insert_with(|| self.progress.seconds())),
+                    Ok(false) => {}
+                    Err(e) => {
+                        self.progress.note(&format!("warning: no preview: {}: {e}", self.pictures.png.display()));
+                        broken = true;
+                    }
+                }
+            }
+            self.show(merger, &preview);
+        });
+        (outcome, first)
+    }
+
+    fn show(&mut self, merger: &Merger, preview: &Preview) {
+        let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
+        // Of several budgets, the one that is nearest to its end tells how far the job is.
+        let time = self.settings.budget.time_s.map_or(0.0, |t| self.progress.seconds() / t);
+        let spp = if self.settings.budget.spp.is_some() { merger.fraction() } else { 0.0 };
+        let fraction = if merger.finished() { 1.0 } else { spp.max(time).min(1.0) };
+        let samples = merger.counters().samples;
+        self.progress.show(&Moment { fraction, samples, pixels, error: preview.error() });
+    }
 }

@@ -1,0 +1,131 @@
+//! What a file knows of its error.
+
+use super::CHANNELS;
+use renderer::film::exr::Picture;
+use renderer::film::{ChannelMeans, Filter};
+use renderer::math::Vec2;
+use renderer::scene::desc::FilterDesc;
+use std::ops::Range;
+
+/// How files with pixel variances were made.
+#[derive(Clone, Copy, Debug)]
+pub struct Assumptions {
+    /// Independent images behind a `variance.*` layer.
+    pub replicates: u32,
+    /// The filter that splatted the samples; `None` = as the file's comments say, else a box.
+    pub filter: Option<FilterDesc>,
+}
+
+/// What a file knows of its error.
+pub(super) enum Errors {
+    /// Standard errors of blocks (at each pixel) and of the image, from groups.
+    Groups { block: Vec<[f32; 3]>, image: ChannelMeans },
+    /// Variance of each pixel; how much larger the variance of a block's mean is than that of independent pixels, by axis.
+    Pixels { variance: Vec<[f32; 3]>, dof: f64, filter: [Filter; 2], name: String },
+}
+
+impl Errors {
+    pub(super) fn of(p: &Picture, assume: &Assumptions) -> Option<Self> {
+        let layer = |name: &str| {
+            let names = CHANNELS.map(|c| format!("{name}.{c}"));
+            p.triple([&names[0], &names[1], &names[2]])
+        };
+        if let (Some(block), Some(image)) = (layer("blockerror"), p.metadata.as_ref().and_then(|m| m.channels)) {
+            return Some(Self::Groups { block, image });
+        }
+        let square = |v: Vec<[f32; 3]>| v.into_iter().map(|p| p.map(|s| s * s)).collect();
+        let variance = layer("variance").or_else(|| layer("stderror").map(square))?;
+        let (desc, name) = match assume.filter {
+            Some(f) => (f, filter_name(&f)),
+            None => filter_of_comments(&p.comments)
+                .map_or((FilterDesc::Box { radius: 0.5 }, "box"), |f| (f, filter_name(&f))),
+        };
+        let filter = [Filter::new(&desc, p.width, 1), Filter::new(&desc, p.height, 1)];
+        let name = format!("pixel variances of {} images, {name} filter", assume.replicates);
+        Some(Self::Pixels { variance, dof: f64::from(assume.replicates) - 1.0, filter, name })
+    }
+
+    pub(super) fn describe(&self) -> String {
+        match self {
+            Self::Groups { image, .. } => format!("block errors of {} replicate groups", image.groups),
+            Self::Pixels { name, .. } => name.clone(),
+        }
+    }
+
+    /// Variance and degrees of freedom of the mean over a block.
+    pub(super) fn block(&self, width: u32, x: &Range<u32>, y: &Range<u32>, c: usize) -> (f64, f64) {
+        match self {
+            Self::Groups { block, image } => {
+                let se = f64::from(block[(y.start * width + x.start) as usize][c]);
+                (se * se, f64::from(image.groups) - 1.0)
+            }
+            Self::Pixels { variance, dof, filter, .. } => {
+                let (mut sum, mut squares) = (0.0, 0.0);
+                for i in y.clone().flat_map(|y| x.clone().map(move |x| (y * width + x) as usize)) {
+                    let v = f64::from(variance[i][c]);
+                    sum += v;
+                    squares += v * v;
+                }
+                let inflation = inflation(&filter[0], x) * inflation(&filter[1], y);
+                let n = (x.len() * y.len()) as f64;
+                // Welch-Satterthwaite; as many pixels as share a sample count once.
+                let effective = if squares > 0.0 { (sum * sum / squares * dof / inflation).max(*dof) } else { *dof };
+                (sum * inflation / (n * n), effective)
+            }
+        }
+    }
+
+    /// Variance and degrees of freedom of the mean over the image.
+    pub(super) fn image(&self, width: u32, height: u32, c: usize) -> (f64, f64) {
+        match self {
+            Self::Groups { image, .. } => (image.std_error[c] * image.std_error[c], f64::from(image.groups) - 1.0),
+            Self::Pixels { .. } => self.block(width, &(0..width), &(0..height), c),
+        }
+    }
+}
+
+/// How much larger the variance of the mean over `pixels` is than the mean of the pixels' variances over their number, along one axis:
+/// the integral of the squared sum of their filters, over the sum of the integrals of their squares.
+fn inflation(filter: &Filter, pixels: &Range<u32>) -> f64 {
+    const STEPS: u32 = 32;
+    let reach = filter.radius().ceil() as u32;
+    let (first, last) = (pixels.start.saturating_sub(reach), pixels.end + reach);
+    let (mut joint, mut single) = (0.0, 0.0);
+    for i in first * STEPS..last * STEPS {
+        let at = Vec2::new((i as f32 + 0.5) / STEPS as f32, 0.5);
+        let weights = || filter.weights(at);
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for (_, _, w) in weights().iter().filter(|(x, _, _)| pixels.contains(x)) {
+            sum += f64::from(w);
+            squares += f64::from(w) * f64::from(w);
+        }
+        joint += sum * sum;
+        single += squares;
+    }
+    if single > 0.0 { joint / single } else { 1.0 }
+}
+
+fn filter_name(f: &FilterDesc) -> &'static str {
+    match f {
+        FilterDesc::Box { .. } => "box",
+        FilterDesc::Tent { .. } => "tent",
+        FilterDesc::Gaussian { .. } => "gaussian",
+        FilterDesc::BlackmanHarris { .. } => "blackman-harris",
+    }
+}
+
+/// A filter by name, with the width that Mitsuba gives it.
+pub fn filter_by_name(name: &str) -> Option<FilterDesc> {
+    Some(match name {
+        "box" => FilterDesc::Box { radius: 0.5 },
+        "tent" => FilterDesc::Tent { radius: 1.0 },
+        "gaussian" => FilterDesc::Gaussian { stddev: 0.5 },
+        _ => return None,
+    })
+}
+
+/// The filter that comments such as `8 seeds x 512 spp, tent filter` name.
+fn filter_of_comments(comments: &str) -> Option<FilterDesc> {
+    let words: Vec<&str> = comments.split(|c: char| !c.is_alphanumeric()).collect();
+    words.windows(2).find(|w| w[1] == "filter").and_then(|w| filter_by_name(w[0]))
+}
