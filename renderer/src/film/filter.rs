@@ -211,17 +211,21 @@ mod tests {
         let pixels = [(3, 2), (0, 2), (6, 4), (1, 0)];
         let significance = sidak(0.01, roster.len() * pixels.len());
         for (desc, filter) in &roster {
-            for (x, y) in pixels {
-                let (columns, rows) = (SIZE[0] as usize * 4, SIZE[1] as usize * 4);
-                let mut expected = vec![0.0; columns * rows];
-                let n = 40_000;
-                for fy in 0..SIZE[1] * 4 * FINE {
-                    for fx in 0..SIZE[0] * 4 * FINE {
-                        let at = Vec2::new(fx as f32 + 0.5, fy as f32 + 0.5) / (4 * FINE) as f32;
-                        let bin = (fy / FINE) as usize * columns + (fx / FINE) as usize;
-                        expected[bin] += h(filter, at, x, y) * f64::from(n) / f64::from(16 * FINE * FINE);
+            let (columns, rows) = (SIZE[0] as usize * 4, SIZE[1] as usize * 4);
+            let n = 40_000;
+            let mut expected = vec![vec![0.0; columns * rows]; pixels.len()];
+            for fy in 0..SIZE[1] * 4 * FINE {
+                for fx in 0..SIZE[0] * 4 * FINE {
+                    let at = Vec2::new(fx as f32 + 0.5, fy as f32 + 0.5) / (4 * FINE) as f32;
+                    let bin = (fy / FINE) as usize * columns + (fx / FINE) as usize;
+                    for (x, y, w) in filter.weights(at).iter() {
+                        if let Some(k) = pixels.iter().position(|p| *p == (x, y)) {
+                            expected[k][bin] += f64::from(w) * f64::from(n) / f64::from(16 * FINE * FINE);
+                        }
                     }
                 }
+            }
+            for ((x, y), expected) in pixels.into_iter().zip(expected) {
                 let total: f64 = expected.iter().sum();
                 assert!((total / f64::from(n) - 1.0).abs() < 1e-3, "{desc:?}, pixel {x} {y}: {total}");
                 let mut observed = vec![0.0; columns * rows];

@@ -176,7 +176,7 @@ impl Emitter for AreaLight {
             .into_iter()
             .map(|(name, geometry, textures, emission)| {
                 let light = Self::new(&geometry, ObjectId(0), &emission).unwrap().into();
-                super::tests::Example { name, geometry, textures, light }
+                super::tests::Example::new(name, geometry, textures, light)
             })
             .collect()
     }

@@ -62,7 +62,7 @@ struct Integral {
 
 #[test]
 fn densities_match_histograms_and_integrate_to_one() {
-    const SAMPLES: usize = 40_000;
+    const SAMPLES: usize = 20_000;
     let roster: Vec<Example> = roster().into_iter().filter(|e| !e.is_delta()).collect();
     let tests: usize = roster.iter().map(|e| e.points().len()).sum();
     let significance = sidak(0.01, 2 * tests);
@@ -88,7 +88,7 @@ fn densities_match_histograms_and_integrate_to_one() {
             .map(|bin| {
                 let coarse = bins.integrate(look, bin, 12, &mut s);
                 let crossed = coarse.dark && (coarse.value > 0.0 || observed[bin] > 0.0);
-                if crossed { bins.integrate(look, bin, 64, &mut s) } else { coarse }
+                if crossed { bins.integrate(look, bin, 32, &mut s) } else { coarse }
             })
             .collect();
         // Compare.

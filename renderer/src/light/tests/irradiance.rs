@@ -44,7 +44,7 @@ fn emitter(name: &'static str, shape: Shape, m: DAffine3) -> Example {
     let geometry = Geometry { meshes: vec![square()], objects };
     let emission = Emission { radiance: RgbParam::Const(Rgb::ONE), two_sided: true };
     let light = Light::area(&geometry, ObjectId(0), &emission).unwrap();
-    Example { name, geometry, textures: Vec::new(), light }
+    Example::new(name, geometry, Vec::new(), light)
 }
 
 /// Irradiance at the origin, normal +z, from the polygon of radiance 1 (Lambert 1760).

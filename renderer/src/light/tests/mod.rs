@@ -12,7 +12,7 @@ pub(super) use examples::{emitters, environments};
 
 use super::{Light, LightContext};
 use crate::accel::Accel;
-use crate::geometry::{Geometry, Object, Shape};
+use crate::geometry::{BoundingSphere, Geometry, Object, Shape};
 use crate::math::{Anchor, DAffine3, DVec3, Frame, Ray, Transform, Vec2, Vec3};
 use crate::sampling::{IndependentSampler, Sampler, warp};
 use crate::texture::Texture;
@@ -24,18 +24,24 @@ pub(super) struct Example {
     pub geometry: Geometry,
     pub textures: Vec<Texture>,
     pub light: Light,
+    bounds: BoundingSphere,
 }
 
 impl Example {
+    pub fn new(name: &'static str, geometry: Geometry, textures: Vec<Texture>, light: Light) -> Self {
+        let bounds = geometry.bounds();
+        Self { name, geometry, textures, light, bounds }
+    }
+
     /// A light without a surface, in a scene of radius 2 around the origin.
     pub fn free(name: &'static str, light: Light) -> Self {
         let to_world = Transform::new(DAffine3::from_scale(DVec3::splat(2.0 / 3f64.sqrt()))).unwrap();
         let objects = vec![Object { shape: Shape::Sphere, to_world, flip_normals: false }];
-        Self { name, geometry: Geometry { meshes: Vec::new(), objects }, textures: Vec::new(), light }
+        Self::new(name, Geometry { meshes: Vec::new(), objects }, Vec::new(), light)
     }
 
     pub fn ctx(&self) -> LightContext<'_> {
-        LightContext { geometry: &self.geometry, textures: &self.textures, bounds: self.geometry.bounds() }
+        LightContext { geometry: &self.geometry, textures: &self.textures, bounds: self.bounds }
     }
 
     pub fn is_area(&self) -> bool {
