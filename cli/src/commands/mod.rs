@@ -1,6 +1,7 @@
 //! The subcommands: one file each, one line each in [`Command`] and its `match`.
 
 mod diff;
+mod info;
 mod render;
 
 use crate::exit::Outcome;
@@ -14,6 +15,8 @@ pub enum Command {
     Render(render::Args),
     /// Compare a picture with a reference
     Diff(diff::Args),
+    /// Show what a scene contains, what will be skipped, and all that is wrong with it
+    Info(info::Args),
 }
 
 impl Command {
@@ -22,13 +25,14 @@ impl Command {
         match self {
             Self::Render(args) => render::run(args, console),
             Self::Diff(args) => diff::run(args, console),
+            Self::Info(args) => info::run(args, console),
         }
     }
 
     /// What is logged when `RUST_LOG` is not set: services say what they do, the others only what is wrong.
     pub fn default_log_level(&self) -> &'static str {
         match self {
-            Self::Render(_) | Self::Diff(_) => "warn",
+            Self::Render(_) | Self::Diff(_) | Self::Info(_) => "warn",
         }
     }
 }

@@ -154,6 +154,15 @@ macro_rules! bsdfs {
         })*
 
         impl Material {
+            /// The name of its kind.
+            pub fn kind(&self) -> &'static str {
+                match self {
+                    $(Self::$name { .. } => stringify!($name),)*
+                    Self::TwoSided { .. } => "TwoSided",
+                    Self::NormalMap { .. } => "NormalMap",
+                }
+            }
+
             /// The BSDF at one point; `None` for materials that only wrap others.
             fn resolve(&self, at: &At) -> Option<Bsdf> {
                 match *self {

@@ -103,6 +103,11 @@ macro_rules! lights {
         }
 
         impl Light {
+            /// The name of its kind.
+            pub fn kind(&self) -> &'static str {
+                match self { $(Self::$variant(_) => stringify!($variant),)* }
+            }
+
             /// What kinds of delta distributions the light has, and whether it is infinitely far away.
             #[inline]
             pub fn flags(&self) -> LightFlags {
