@@ -1,5 +1,7 @@
 //! `lightfarm render` as a user meets it: files, exit statuses, full disks and interruptions.
 
+#![allow(clippy::unwrap_used, reason = "test code")]
+
 mod common;
 
 use common::{Lab, Run, read};
