@@ -46,13 +46,16 @@ pub fn chi2_test_with_errors(observed: &[f64], expected: &[f64], variance: &[f64
     Chi2 { statistic, dof, p }
 }
 
-/// Whether `observed` counts agree with `expected` ones of the same, fixed total. Cells are pooled, rarest first, until every pool
+/// Whether `observed` counts agree with `expected` ones of the same, fixed total. Cells are pooled, rare ones first, until every pool
 /// expects 5. What is observed where nothing is expected gives a p-value of 0. `None` when fewer than two pools are left: there is
 /// nothing to test.
 pub fn chi2_test_fixed_total(observed: &[f64], expected: &[f64]) -> Option<Chi2> {
     assert_eq!(observed.len(), expected.len());
+    // Order by octaves: were equal cells ordered by the rounding of their expectations, and that rounding depended on what was observed
+    // (adaptive quadrature), empty cells would be pooled with empty ones.
+    let octave = |i: usize| libm::log2(expected[i].max(f64::MIN_POSITIVE)).floor() as i64;
     let mut order: Vec<usize> = (0..expected.len()).collect();
-    order.sort_by(|&a, &b| expected[a].total_cmp(&expected[b]));
+    order.sort_by_key(|&i| octave(i));
     // Pool the rarest cells.
     let mut pools: Vec<[f64; 2]> = Vec::new();
     let mut pool = [0.0; 2];

@@ -1,7 +1,7 @@
 //! Microfacet normal distributions with Smith shadowing, drawn by visible normals.
 
 use super::Distribution;
-use crate::math::{Vec2, Vec3, erf, erf64, exp, exp64, ln, safe_sqrt, sin_cos, sqr};
+use crate::math::{Vec2, Vec3, erf, exp, ln, safe_sqrt, sin_cos, sqr};
 use std::f32::consts::PI;
 use std::f64::consts::FRAC_2_SQRT_PI;
 
@@ -121,10 +121,10 @@ fn sample_visible_beckmann(w: Vec3, u: Vec2) -> Vec3 {
     let cot = f64::from(w.z) / f64::from(sin);
     let tan = if cot > 1e-7 { 1.0 / cot } else { 1e7 };
     // Solve cumulative(z) = u, z = erf(x), by Newton steps that bisect when they leave the bracket.
-    let (mut low, mut high) = (-1.0f64, erf64(cot));
-    let cumulative = |z: f64, x: f64| 1.0 + z + INV_SQRT_PI * tan * exp64(-x * x);
+    let (mut low, mut high) = (-1.0f64, f64::from(erf(cot as f32)));
+    let cumulative = |z: f64, x: f64| 1.0 + z + INV_SQRT_PI * tan * f64::from(exp(-(x * x) as f32));
     let target = f64::from(u.x) * cumulative(high, cot);
-    let mut z = low + (high - low) * f64::from(u.x);
+    let mut z = high - (high - low) * f64::from(erf((-ln(u.x.max(1e-7))).sqrt()));
     for _ in 0..40 {
         let x = erf_inverse(z);
         let error = cumulative(z, x) - target;
@@ -134,12 +134,12 @@ fn sample_visible_beckmann(w: Vec3, u: Vec2) -> Vec3 {
             low = z
         }
         let step = error / (1.0 - x * tan);
-        let next = if z - step > low && z - step < high { z - step } else { 0.5 * (low + high) };
-        let change = (next - z).abs();
-        z = next;
-        if !(change > 1e-7 * (1.0 - z.abs())) {
+        // Newton steps square the error: after one so short it is below that of the inverse error function.
+        if step.abs() < 1e-3 * (1.0 - z.abs()) {
+            z -= step;
             break;
         }
+        z = if z - step > low && z - step < high { z - step } else { 0.5 * (low + high) };
     }
     // Turn the slopes into the plane of w.
     let (along, across) = (erf_inverse(z) as f32, across as f32);
@@ -173,6 +173,15 @@ fn erf_inverse(x: f64) -> f64 {
         1.001_674,
         2.832_976_8,
     ];
-    let (coefficients, t) = if w < 5.0 { (&CENTRE, w - 2.5) } else { (&TAILS, w.sqrt() - 3.0) };
-    f64::from(coefficients.iter().fold(0.0, |p, c| p * t + c)) * x
+    let factor = if w < 5.0 { polynomial(&CENTRE, w - 2.5) } else { polynomial(&TAILS, w.sqrt() - 3.0) };
+    f64::from(factor) * x
+}
+
+/// The polynomial with coefficients from the highest power down; even and odd powers apart, for two short chains of operations.
+#[inline]
+fn polynomial(c: &[f32; 9], t: f32) -> f32 {
+    let t2 = t * t;
+    let even = (((c[0] * t2 + c[2]) * t2 + c[4]) * t2 + c[6]) * t2 + c[8];
+    let odd = ((c[1] * t2 + c[3]) * t2 + c[5]) * t2 + c[7];
+    even + odd * t
 }
