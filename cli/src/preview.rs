@@ -6,26 +6,35 @@ use renderer::job::Merger;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+/// When a picture that is not complete yet is better than none.
+const PATIENCE: Duration = Duration::from_secs(1);
 /// Time between previews.
 const INTERVAL: Duration = Duration::from_secs(3);
 /// A preview is made so seldom that it takes less than a hundredth of the time.
 const REST: u32 = 100;
 
-/// Writes a PNG of what is merged: as soon as every pixel has samples, then every few seconds.
+/// Writes a PNG of what is merged: as soon as every pixel has samples (or a second after the start, what is there), then every few
+/// seconds.
 pub struct Preview {
     path: PathBuf,
     exposure: f64,
+    started: Instant,
+    /// When the first was on disk, after the start.
+    first: Option<Duration>,
     /// Units seen so far in the first pass.
     seen: u32,
     covered: bool,
     next: Instant,
+    /// No more can be written.
+    broken: bool,
     error: Option<ErrorSummary>,
 }
 
 impl Preview {
-    /// To `path`, exposed by `exposure` stops.
-    pub fn new(path: PathBuf, exposure: f64) -> Self {
-        Self { path, exposure, seen: 0, covered: false, next: Instant::now(), error: None }
+    /// To `path`, exposed by `exposure` stops; the user waits since `started`.
+    pub fn new(path: PathBuf, exposure: f64, started: Instant) -> Self {
+        let next = started + PATIENCE;
+        Self { path, exposure, started, first: None, seen: 0, covered: false, next, broken: false, error: None }
     }
 
     /// The error as of the last preview.
@@ -33,18 +42,29 @@ impl Preview {
         self.error
     }
 
-    /// Writes a preview when it is time to. `Err` says why it can't be written.
-    pub fn update(&mut self, merger: &Merger) -> Result<bool, String> {
-        if !self.covers(merger) || Instant::now() < self.next {
-            return Ok(false);
+    /// When the first preview was on disk, in seconds after the start.
+    pub fn first(&self) -> Option<f64> {
+        self.first.map(|d| d.as_secs_f64())
+    }
+
+    /// Writes a preview when it is time to. `Err` says, once, why none can be written.
+    pub fn update(&mut self, merger: &Merger) -> Result<(), String> {
+        let completed = !self.covered && self.covers(merger);
+        let due = completed || (Instant::now() >= self.next && merger.counters().samples > 0);
+        if self.broken || !due {
+            return Ok(());
         }
-        let started = Instant::now();
+        let begun = Instant::now();
         let image = merger.image();
         self.error = image.error;
         let written = png::encode(&image, self.exposure)
             .and_then(|bytes| save::write(&self.path, &bytes).map_err(|e| e.to_string()));
-        self.next = Instant::now() + INTERVAL.max(started.elapsed() * REST);
-        written.map(|()| true)
+        self.next = Instant::now() + INTERVAL.max(begun.elapsed() * REST);
+        self.broken = written.is_err();
+        if written.is_ok() {
+            self.first.get_or_insert_with(|| self.started.elapsed());
+        }
+        written.map_err(|e| format!("{}: {e}", self.path.display()))
     }
 
     /// Whether every pixel has samples: the first group of the first pass is complete. Splats cover the film from the start.

@@ -10,6 +10,7 @@ use crate::{scene_file, signals};
 use renderer::job::{LocalEvent, LocalOptions, LocalOutcome, Merger, RenderSettings, Stop, UnitError, render_local};
 use renderer::scene::Scene;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// What to render and where to put it.
 #[derive(Debug, clap::Args)]
@@ -28,6 +29,7 @@ static STOP: Stop = Stop::new();
 
 /// Runs it.
 pub fn run(args: Args, console: &Console) -> Outcome {
+    let started = Instant::now();
     signals::stop_on_interrupt(&STOP)
         .map_err(|e| Failure::Machine(format!("error: the handlers of signals can't be installed: {e}")))?;
     let pictures = Pictures::new(&args.output, &args.scene)?;
@@ -37,8 +39,9 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         .map_err(|e| Failure::Input(format!("error: {e}")))?;
     let (manifest, _) = loaded.files.into_bundle(loaded.root);
     let options = LocalOptions { threads: args.threads.count() };
-    let mut session = Session { progress: Progress::new(console), pictures: &pictures, settings: &settings };
-    let (outcome, first_preview) = session.render(&loaded.scene, &options);
+    let mut session = Session { progress: Progress::new(console), settings: &settings };
+    let mut preview = Preview::new(pictures.png.clone(), pictures.exposure, started);
+    let outcome = session.render(&loaded.scene, &options, &mut preview);
     session.progress.finish();
     let seconds = session.progress.seconds();
     let outcome = outcome.map_err(|e| Failure::Machine(format!("error: {e}")))?;
@@ -48,7 +51,7 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     }
     let saved = pictures.save(&outcome.image, &settings.provenance(manifest.digest()))?;
     let summary = Summary::new(&outcome, &settings, manifest.digest(), seconds, &saved);
-    let summary = summary.with_first_preview(first_preview);
+    let summary = summary.with_first_preview(preview.first());
     console.result(&summary, &summary);
     match saved.failure {
         Some(failure) => Err(failure),
@@ -60,30 +63,23 @@ pub fn run(args: Args, console: &Console) -> Outcome {
 /// A render with progress and previews.
 struct Session<'a> {
     progress: Progress,
-    pictures: &'a Pictures,
     settings: &'a RenderSettings,
 }
 
 impl Session<'_> {
-    /// Renders; also tells when the first preview was on disk, in seconds.
-    fn render(&mut self, scene: &Scene, options: &LocalOptions) -> (Result<LocalOutcome, UnitError>, Option<f64>) {
-        let mut preview = Preview::new(self.pictures.png.clone(), self.pictures.exposure);
-        let (mut broken, mut first) = (false, None);
-        let outcome = render_local(scene, self.settings, options, &STOP, &mut |event| {
+    fn render(
+        &mut self,
+        scene: &Scene,
+        options: &LocalOptions,
+        preview: &mut Preview,
+    ) -> Result<LocalOutcome, UnitError> {
+        render_local(scene, self.settings, options, &STOP, &mut |event| {
             let (LocalEvent::Progress(merger) | LocalEvent::PassDone(merger)) = event;
-            if !broken {
-                match preview.update(merger) {
-                    Ok(true) => drop(first.get_or_insert_with(|| self.progress.seconds())),
-                    Ok(false) => {}
-                    Err(e) => {
-                        self.progress.note(&format!("warning: no preview: {}: {e}", self.pictures.png.display()));
-                        broken = true;
-                    }
-                }
+            if let Err(e) = preview.update(merger) {
+                self.progress.note(&format!("warning: no preview: {e}"));
             }
-            self.show(merger, &preview);
-        });
-        (outcome, first)
+            self.show(merger, preview);
+        })
     }
 
     fn show(&mut self, merger: &Merger, preview: &Preview) {
