@@ -1,0 +1,219 @@
+//! The units of one pass and who works on them: a pure state machine. Time comes in as an argument; nothing is read or written.
+//!
+//! Every unit is free, held (by at most two leases, of different workers) or done. Holding is only a hint about who should work on
+//! what: a result counts whoever brings it, once.
+
+use crate::ids::{Epoch, WorkerId};
+use crate::units::UnitSet;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::time::Duration;
+
+/// Units that a worker was given together.
+#[derive(Clone, Debug)]
+pub struct Lease {
+    /// Who holds it.
+    pub worker: WorkerId,
+    /// Those whose outcome has not come yet.
+    pub units: UnitSet,
+    /// When it was given out, or its latest outcome came.
+    pub progress: Duration,
+}
+
+/// How fast a worker gets through the units of a job.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Units at a time.
+    pub threads: u32,
+    /// Seconds that one takes.
+    pub unit_seconds: f64,
+}
+
+/// The units of one pass.
+#[derive(Clone, Debug)]
+pub struct PassBoard {
+    count: u32,
+    free: UnitSet,
+    done: UnitSet,
+    leases: BTreeMap<Epoch, Lease>,
+    /// The leases that hold a unit: one or two.
+    holders: BTreeMap<u32, (Epoch, Option<Epoch>)>,
+}
+
+impl PassBoard {
+    /// `count` units, of which `done` need no work.
+    pub fn new(count: u32, done: UnitSet) -> Self {
+        let mut free = UnitSet::default();
+        let mut from = 0;
+        for range in done.ranges() {
+            free.insert_range(from..range.start.min(count));
+            from = range.end;
+        }
+        free.insert_range(from..count.max(from));
+        Self { count, free, done, leases: BTreeMap::new(), holders: BTreeMap::new() }
+    }
+
+    /// Number of units.
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Units that are done.
+    pub fn done(&self) -> &UnitSet {
+        &self.done
+    }
+
+    /// Units that nobody works on.
+    pub fn free(&self) -> &UnitSet {
+        &self.free
+    }
+
+    /// The lease of an epoch.
+    pub fn lease(&self, epoch: Epoch) -> Option<&Lease> {
+        self.leases.get(&epoch)
+    }
+
+    /// Every lease.
+    pub fn leases(&self) -> impl Iterator<Item = (Epoch, &Lease)> {
+        self.leases.iter().map(|(e, l)| (*e, l))
+    }
+
+    /// Leases the first free units, `most` at most.
+    pub fn grant(&mut self, worker: WorkerId, epoch: Epoch, most: u32, now: Duration) -> Option<Range<u32>> {
+        let range = self.free.take_first(most)?;
+        self.add_lease(worker, epoch, range.clone(), now);
+        Some(range)
+    }
+
+    /// Leases a second time what `thief` would finish sooner than who holds it: the last units, at most half, of the lease that ends
+    /// last. With `overdue` only where a lease has stood still for far longer than a unit takes.
+    pub fn grant_second(
+        &mut self,
+        thief: WorkerId,
+        epoch: Epoch,
+        pace: Pace,
+        overdue: bool,
+        now: Duration,
+        pace_of: impl Fn(WorkerId) -> Option<Pace>,
+    ) -> Option<Range<u32>> {
+        let mut best: Option<(f64, Range<u32>)> = None;
+        for lease in self.leases.values().filter(|l| l.worker != thief) {
+            let Some(range) = self.last_single(lease) else { continue };
+            // When its holder will be through, were it alone; never, if it stands still.
+            let its = pace_of(lease.worker).unwrap_or(pace);
+            let waited = now.saturating_sub(lease.progress).as_secs_f64();
+            let rounds = f64::from(lease.units.len().div_ceil(its.threads.max(1)));
+            let stands_still = waited > 4.0 * its.unit_seconds + 2.0;
+            let left = if stands_still { f64::INFINITY } else { rounds * its.unit_seconds - waited };
+            if overdue && !stands_still {
+                continue;
+            }
+            let n = (range.len() as u32).min(lease.units.len().div_ceil(2)).max(1);
+            let range = range.end - n..range.end;
+            let needs = f64::from(n.div_ceil(pace.threads.max(1))) * pace.unit_seconds;
+            if needs < left && best.as_ref().is_none_or(|(l, _)| left > *l) {
+                best = Some((left, range));
+            }
+        }
+        let (_, range) = best?;
+        self.add_lease(thief, epoch, range.clone(), now);
+        Some(range)
+    }
+
+    /// The last run of a lease's units that nobody else holds.
+    fn last_single(&self, lease: &Lease) -> Option<Range<u32>> {
+        let single = |u: &u32| self.holders.get(u).is_some_and(|(_, second)| second.is_none());
+        let end = lease.units.iter().rev().find(single)? + 1;
+        let run = (0..end).rev().take_while(|u| lease.units.contains(*u) && single(u)).count() as u32;
+        Some(end - run..end)
+    }
+
+    fn add_lease(&mut self, worker: WorkerId, epoch: Epoch, range: Range<u32>, now: Duration) {
+        for unit in range.clone() {
+            self.holders.entry(unit).and_modify(|h| h.1 = Some(epoch)).or_insert((epoch, None));
+        }
+        self.leases.insert(epoch, Lease { worker, units: UnitSet::from_range(range), progress: now });
+    }
+
+    /// Takes over a lease that a worker says it holds (after a restart, or when it was thought lost), as far as its units are free.
+    /// Returns the units that it now holds.
+    pub fn adopt(&mut self, worker: WorkerId, epoch: Epoch, claimed: &UnitSet, now: Duration) -> UnitSet {
+        let mut units = UnitSet::default();
+        for unit in claimed.iter().filter(|u| self.free.contains(*u)) {
+            units.insert(unit);
+        }
+        if units.is_empty() || self.leases.contains_key(&epoch) {
+            return UnitSet::default();
+        }
+        for unit in units.iter() {
+            self.free.remove(unit);
+            self.holders.insert(unit, (epoch, None));
+        }
+        self.leases.insert(epoch, Lease { worker, units: units.clone(), progress: now });
+        units
+    }
+
+    /// A unit's result is stored: nobody needs to work on it. Returns who did; `None` when it was done before.
+    pub fn complete(&mut self, unit: u32, now: Duration) -> Option<Vec<(Epoch, WorkerId)>> {
+        if unit >= self.count || !self.done.insert(unit) {
+            return None;
+        }
+        self.free.remove(unit);
+        let mut freed = Vec::new();
+        if let Some((first, second)) = self.holders.remove(&unit) {
+            for epoch in std::iter::once(first).chain(second) {
+                if let Some(worker) = self.forget(epoch, unit, now) {
+                    freed.push((epoch, worker));
+                }
+            }
+        }
+        Some(freed)
+    }
+
+    /// A lease gives a unit back undone.
+    pub fn give_back(&mut self, epoch: Epoch, unit: u32, now: Duration) -> bool {
+        let holds = self.leases.get(&epoch).is_some_and(|l| l.units.contains(unit));
+        if holds {
+            self.forget(epoch, unit, now);
+            self.unhold(epoch, unit);
+        }
+        holds
+    }
+
+    /// Ends a lease; its units that nobody else holds are free again.
+    pub fn release(&mut self, epoch: Epoch) -> Option<Lease> {
+        let lease = self.leases.remove(&epoch)?;
+        lease.units.iter().for_each(|u| self.unhold(epoch, u));
+        Some(lease)
+    }
+
+    /// Takes a unit off a lease, and the lease off the board with its last unit.
+    fn forget(&mut self, epoch: Epoch, unit: u32, now: Duration) -> Option<WorkerId> {
+        let lease = self.leases.get_mut(&epoch)?;
+        lease.units.remove(unit);
+        lease.progress = now;
+        let worker = lease.worker;
+        if lease.units.is_empty() {
+            self.leases.remove(&epoch);
+        }
+        Some(worker)
+    }
+
+    fn unhold(&mut self, epoch: Epoch, unit: u32) {
+        match self.holders.get(&unit).copied() {
+            Some((first, Some(second))) => {
+                let rest = if first == epoch { second } else { first };
+                self.holders.insert(unit, (rest, None));
+            }
+            Some((first, None)) if first == epoch => {
+                self.holders.remove(&unit);
+                self.free.insert(unit);
+            }
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "lease_tests.rs"]
+mod tests;
