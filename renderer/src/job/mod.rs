@@ -1,6 +1,7 @@
 //! A job: settings, passes, units, results and their merge. The same code runs in `lightfarm render` and on the farm.
 
 mod codec;
+pub mod document;
 mod local;
 mod merger;
 mod plan;
