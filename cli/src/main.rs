@@ -3,6 +3,7 @@
 mod commands;
 mod diff;
 mod exit;
+mod farm;
 mod options;
 mod output;
 mod pictures;

@@ -1,16 +1,10 @@
 //! Images as files.
 
 use crate::merge::Snapshot;
-use renderer::film::exr::{self, Provenance};
+use renderer::film::exr;
 
 /// The EXR of an image, exactly as `lightfarm render` writes it.
 pub fn exr_of(snapshot: &Snapshot) -> Result<Vec<u8>, String> {
-    let settings = serde_json::to_value(&snapshot.spec.settings).map_err(|e| e.to_string())?;
-    let about = Provenance { scene: snapshot.spec.scene, seed: snapshot.spec.settings.seed, settings };
+    let about = snapshot.spec.settings.provenance(snapshot.spec.scene);
     exr::encode(&snapshot.image, &about)
-}
-
-/// The PNG of an image, for looking at.
-pub fn png_of(snapshot: &Snapshot) -> Result<Vec<u8>, String> {
-    renderer::film::png::encode(&snapshot.image, 0.0)
 }

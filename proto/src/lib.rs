@@ -2,6 +2,7 @@
 
 pub mod connect;
 pub mod dns;
+pub mod json;
 
 /// Messages and services of `farm.proto`; documented there.
 #[allow(missing_docs, clippy::all, clippy::unwrap_used)]

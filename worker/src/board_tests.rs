@@ -1,6 +1,7 @@
 //! The board without threads: what is held, what is dropped, what is kept for delivery.
 
 use super::*;
+use renderer::diagnostics::Diagnostics;
 use renderer::job::{Planner, RenderOptions, RenderSettings};
 use renderer::scene::desc::{RenderDefaults, SceneDesc};
 
@@ -13,7 +14,13 @@ fn context() -> (Digest, Arc<PassContext>) {
     let plan = Planner::new(settings.clone()).first();
     let document = PassDocument::new(Digest::of(b"manifest"), settings, plan);
     let digest = Digest::of(&document.to_json().unwrap());
-    (digest, Arc::new(PassContext { scene: Arc::new(Scene::build(SceneDesc::default())), document }))
+    (
+        digest,
+        Arc::new(PassContext {
+            scene: Arc::new(Scene::build(SceneDesc::default(), "", &mut Diagnostics::default()).unwrap()),
+            document,
+        }),
+    )
 }
 
 fn held(board: &Board) -> Vec<(u64, Vec<u32>)> {

@@ -30,7 +30,7 @@ type Reply<T> = Result<Response<T>, Status>;
 /// A control error as a status.
 pub fn control_status(e: ControlError) -> Status {
     match e {
-        ControlError::Ended(_) => Status::failed_precondition(e.to_string()),
+        ControlError::Ended(_) => Status::invalid_argument(e.to_string()),
         ControlError::Store(e) => store_status(&e),
     }
 }
@@ -156,7 +156,7 @@ impl JobService for Jobs {
             },
         };
         let image = tokio::task::spawn_blocking(work).await.map_err(|e| Status::internal(e.to_string()))?;
-        let (exr, complete) = image.map_err(Status::failed_precondition)?;
+        let (exr, complete) = image.map_err(Status::not_found)?;
         let (sender, stream) = mpsc::channel(4);
         tokio::task::spawn_blocking(move || {
             let digest = Digest::of(&exr).0.to_vec().into();
