@@ -31,6 +31,7 @@ use self::mesh::MeshKey;
 use self::report::{Checked, Fault, Report};
 use self::texture::TextureKey;
 use super::image::ImageKind;
+use crate::bsdf::MaterialId;
 use crate::diagnostics::Diagnostics;
 use crate::geometry::MeshId;
 use crate::math::DVec3;
@@ -68,8 +69,28 @@ struct Importer<'a> {
     bounds: (DVec3, DVec3),
 }
 
+/// A file that goes into another scene.
+#[derive(Default)]
+pub(super) struct Part {
+    /// What it contains.
+    pub scene: SceneDesc,
+    /// Whether it has a camera of its own.
+    pub has_camera: bool,
+    /// Its named materials.
+    pub materials: Vec<(String, MaterialId)>,
+}
+
 /// Loads the .gltf or .glb file `root` of `files`. `None` with errors in `diagnostics` where it can't be shown.
 pub(super) fn load_gltf(files: &dyn FileSource, root: &str, diagnostics: &mut Diagnostics) -> Option<SceneDesc> {
+    load(files, root, diagnostics, true).map(|part| part.scene)
+}
+
+/// The same for a file that goes into another scene: nothing stands in for a camera or light that it lacks.
+pub(super) fn load_part(files: &dyn FileSource, root: &str, diagnostics: &mut Diagnostics) -> Option<Part> {
+    load(files, root, diagnostics, false)
+}
+
+fn load(files: &dyn FileSource, root: &str, diagnostics: &mut Diagnostics, stand_ins: bool) -> Option<Part> {
     let mut report = Report::new(root, diagnostics);
     let bytes = files.read(root).map_err(|e| Fault::new("", format!("can't be read: {e}")));
     let document = report.check(bytes.and_then(|bytes| document::parse(&bytes)))?;
@@ -96,11 +117,11 @@ pub(super) fn load_gltf(files: &dyn FileSource, root: &str, diagnostics: &mut Di
         let walked = importer.nodes();
         importer.report.check(walked);
     }
-    importer.finish()
+    importer.finish(stand_ins)
 }
 
 impl Importer<'_> {
-    fn finish(mut self) -> Option<SceneDesc> {
+    fn finish(mut self, stand_ins: bool) -> Option<Part> {
         if !self.root.animations.is_empty() {
             let message = "animations are not supported; the nodes are shown at rest";
             self.report.warn(Fault::new("animations", message));
@@ -110,11 +131,16 @@ impl Importer<'_> {
             self.report.fault(fault.help("give a node of the default scene a mesh of triangles"));
         }
         let failed = self.report.failed();
-        if !failed {
+        if !failed && stand_ins {
             self.stand_ins();
         }
         self.report.finish();
-        (!failed).then_some(self.scene)
+        let named = self.surfaces.iter().filter_map(|(index, surface)| {
+            let name = self.root.materials.get((*index)?)?.name.clone()?;
+            Some((name, surface.material))
+        });
+        let materials = named.collect();
+        (!failed).then_some(Part { scene: self.scene, has_camera: self.has_camera, materials })
     }
 }
 

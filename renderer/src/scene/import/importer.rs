@@ -64,6 +64,18 @@ impl<'a> Importer<'a> {
         }
     }
 
+    /// Where the scene's files come from.
+    pub fn files(&self) -> &'a dyn FileSource {
+        self.files
+    }
+
+    /// Takes over what was said of another file.
+    pub fn absorb(&mut self, diagnostics: Diagnostics) {
+        for d in diagnostics.list {
+            self.report(d.severity, ELSEWHERE, &d.file, d.place, d.message, d.help);
+        }
+    }
+
     /// Reads the text file `path` (already resolved); `from` names the place that asked for it.
     pub fn read_text(&mut self, from: Option<Place>, path: &str) -> Option<(usize, Arc<[u8]>)> {
         let bytes = self.read(from, path)?;

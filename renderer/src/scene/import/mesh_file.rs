@@ -9,6 +9,8 @@ use std::f32::consts::PI;
 /// Where vertex normals come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Normals {
+    /// From the file; a file without them gives a flat mesh.
+    File,
     /// None: a flat mesh.
     Flat,
     /// From the file; a file without them gets smooth normals, computed as the mesh looks through this linear map.
@@ -95,7 +97,7 @@ pub(super) fn parse(bytes: &[u8], path: &str, options: &MeshOptions) -> Result<L
     match options.normals {
         Normals::Flat => mesh.normals = Vec::new(),
         Normals::Smooth(linear) if !own_normals => mesh.normals = smooth_normals(&mesh, linear),
-        Normals::Smooth(_) => {}
+        Normals::File | Normals::Smooth(_) => {}
     }
     Ok(LoadedMesh { mesh, own_normals })
 }

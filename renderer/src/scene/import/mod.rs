@@ -6,12 +6,16 @@ mod importer;
 mod mesh_file;
 mod metals;
 mod mitsuba;
+mod native;
 mod number;
 mod obj;
 mod ply;
+mod transform;
+
+#[cfg(test)]
+mod mesh_tests;
 #[cfg(test)]
 mod tests;
-mod transform;
 
 use super::bundle::FileSource;
 use super::desc::SceneDesc;
@@ -31,6 +35,7 @@ pub fn load(files: &dyn FileSource, root: &str) -> Result<(SceneDesc, Diagnostic
                 None => Err(SceneError(diagnostics.list)),
             };
         }
+        "toml" => native::import(&mut importer, root),
         "xml" => mitsuba::import(&mut importer, root),
         _ => {
             let mut diagnostics = Diagnostics::default();

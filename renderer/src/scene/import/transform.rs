@@ -37,10 +37,10 @@ pub(super) fn without_scale(m: DAffine3) -> Option<DAffine3> {
     Some(DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), m.translation))
 }
 
-/// Whether the linear part is a rotation, reflection and uniform scale, within rounding of six-digit text.
+/// Whether the linear part is a rotation, reflection and uniform scale, within the rounding that a scene allows.
 pub(super) fn is_similarity(m: &DMat3) -> bool {
     let scale = m.x_axis.length_squared();
-    let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * scale;
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-5 * scale;
     near(m.y_axis.length_squared(), scale)
         && near(m.z_axis.length_squared(), scale)
         && [m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis)].iter().all(|&d| near(d, 0.0))

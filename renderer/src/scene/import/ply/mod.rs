@@ -33,7 +33,8 @@ fn read(elements: &[Element], mut body: impl Body) -> Result<Mesh, MeshFileError
             }
             "face" if !seen[1] => {
                 seen[1] = true;
-                read_faces(element, &mut body, &mut mesh)?;
+                let known = if seen[0] { mesh.positions.len() } else { usize::MAX };
+                read_faces(element, known, &mut body, &mut mesh)?;
             }
             _ if element.properties.is_empty() => {}
             _ => (0..element.count).try_for_each(|_| element.properties.iter().try_for_each(|p| skip(&mut body, p)))?,
@@ -42,7 +43,7 @@ fn read(elements: &[Element], mut body: impl Body) -> Result<Mesh, MeshFileError
     if mesh.triangles.is_empty() {
         return Err(body.error("the file has no triangles: it needs an element `vertex` and an element `face`"));
     }
-    // The vertices may come after the faces, so that indices can be checked only here.
+    // Where the vertices come after the faces, indices can be checked only here.
     let count = mesh.positions.len();
     if let Some(t) = mesh.triangles.iter().flatten().find(|&&i| i as usize >= count) {
         return Err(body.error(&format!("a face names the vertex {t}, but there are only {count}")));
@@ -132,7 +133,8 @@ fn read_vertices(element: &Element, body: &mut impl Body, mesh: &mut Mesh) -> Re
     Ok(())
 }
 
-fn read_faces(element: &Element, body: &mut impl Body, mesh: &mut Mesh) -> Result<(), MeshFileError> {
+/// `vertices`: how many there are, as far as known.
+fn read_faces(element: &Element, vertices: usize, body: &mut impl Body, mesh: &mut Mesh) -> Result<(), MeshFileError> {
     let is_corners = |p: &Property| p.list.is_some() && (p.name == "vertex_indices" || p.name == "vertex_index");
     let Some(corners) = element.properties.iter().position(is_corners) else {
         return Err(body.error("the element `face` needs a list property vertex_indices or vertex_index"));
@@ -143,7 +145,7 @@ fn read_faces(element: &Element, body: &mut impl Body, mesh: &mut Mesh) -> Resul
     for i in 0..element.count {
         for (k, property) in element.properties.iter().enumerate() {
             match property.list {
-                Some(counts) if k == corners => read_face(i, counts, property.kind, body, mesh)?,
+                Some(counts) if k == corners => read_face(i, vertices, counts, property.kind, body, mesh)?,
                 _ => skip(body, property)?,
             }
         }
@@ -151,26 +153,36 @@ fn read_faces(element: &Element, body: &mut impl Body, mesh: &mut Mesh) -> Resul
     Ok(())
 }
 
-fn read_face(i: usize, counts: Kind, kind: Kind, body: &mut impl Body, mesh: &mut Mesh) -> Result<(), MeshFileError> {
+fn read_face(
+    i: usize,
+    vertices: usize,
+    counts: Kind,
+    kind: Kind,
+    body: &mut impl Body,
+    mesh: &mut Mesh,
+) -> Result<(), MeshFileError> {
     let count = list_length(body, counts, kind)?;
     if count < 3 {
         return Err(body.error(&format!("the face {i} has {count} corners, 3 or more are needed")));
     }
-    let (first, mut last) = (corner(body, kind)?, corner(body, kind)?);
+    let (first, mut last) = (corner(body, kind, vertices)?, corner(body, kind, vertices)?);
     for _ in 2..count {
-        let next = corner(body, kind)?;
+        let next = corner(body, kind, vertices)?;
         mesh.triangles.push([first, last, next]);
         last = next;
     }
     Ok(())
 }
 
-fn corner(body: &mut impl Body, kind: Kind) -> Result<u32, MeshFileError> {
+fn corner(body: &mut impl Body, kind: Kind, vertices: usize) -> Result<u32, MeshFileError> {
     let value = body.number(kind)?;
-    if value >= 0.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0 {
-        return Ok(value as u32);
+    if !(value >= 0.0 && value <= f64::from(u32::MAX) && value.fract() == 0.0) {
+        return Err(body.error(&format!("{value} is not an index of a vertex")));
     }
-    Err(body.error(&format!("{value} is not an index of a vertex")))
+    if value >= vertices as f64 {
+        return Err(body.error(&format!("a face names the vertex {value}, but there are only {vertices}")));
+    }
+    Ok(value as u32)
 }
 
 fn list_length(body: &mut impl Body, counts: Kind, kind: Kind) -> Result<usize, MeshFileError> {
