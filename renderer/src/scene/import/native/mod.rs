@@ -50,7 +50,9 @@ pub(super) fn import(importer: &mut Importer, root: &str) {
         return;
     }
     let mut root = Table::root(file, entries.get_ref());
-    let part = gltf_part(importer, &mut root).unwrap_or_default();
+    let part = gltf_part(importer, &mut root);
+    // A glTF file that can't be read might have had a camera.
+    let part = part.unwrap_or_else(|| gltf::Part { has_camera: root.has("gltf"), ..gltf::Part::default() });
     let known = part.materials.iter().map(|(name, id)| (name.as_str(), Entry::Built(Some(*id))));
     let builder = Builder {
         importer,
