@@ -67,22 +67,27 @@ fn rectangle() -> Mesh {
     }
 }
 
+/// The faces of the cube: outward normal, direction of u, direction of v. As in Mitsuba, so that its textured cubes look the same.
+const FACES: [[Vec3; 3]; 6] = [
+    [Vec3::NEG_Y, Vec3::Z, Vec3::X],
+    [Vec3::Y, Vec3::NEG_X, Vec3::NEG_Z],
+    [Vec3::X, Vec3::Y, Vec3::NEG_Z],
+    [Vec3::Z, Vec3::Y, Vec3::X],
+    [Vec3::NEG_X, Vec3::Y, Vec3::Z],
+    [Vec3::NEG_Z, Vec3::NEG_Y, Vec3::X],
+];
+
 /// The cube [-1, 1]^3: six squares with their own corners.
 fn cube() -> Mesh {
     let mut mesh = Mesh::default();
-    for axis in 0..3 {
-        for side in [-1.0f32, 1.0] {
-            // (u, v, outward) is right-handed on both sides.
-            let outward = Vec3::from_array(std::array::from_fn(|i| if i == axis { side } else { 0.0 }));
-            let u = Vec3::from_array(std::array::from_fn(|i| f32::from(u8::from(i == (axis + 1) % 3))));
-            let v = outward.cross(u);
-            let first = mesh.positions.len() as u32;
-            for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-                mesh.positions.push(outward + u * a + v * b);
-                mesh.uvs.push(Vec2::new(0.5 * (a + 1.0), 0.5 * (b + 1.0)));
-            }
-            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    for [outward, u, v] in FACES {
+        let first = mesh.positions.len() as u32;
+        for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+            mesh.positions.push(outward + u * a + v * b);
+            mesh.uvs.push(Vec2::new(0.5 * (a + 1.0), 0.5 * (b + 1.0)));
         }
+        // (u, v, outward) is left-handed.
+        mesh.triangles.extend([[first, first + 2, first + 1], [first, first + 3, first + 2]]);
     }
     mesh
 }

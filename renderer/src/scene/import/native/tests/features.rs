@@ -5,7 +5,7 @@ use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use crate::scene::desc::{
     CameraDesc, Emission, FilterDesc, FovAxis, LightDesc, RenderDefaults, SceneDesc, ShapeKind, SpotFalloff,
 };
-use crate::scene::import::tests::scene;
+use crate::scene::import::tests::{assert_error, scene};
 use crate::spectrum::Rgb;
 use crate::texture::{Filter, FloatParam, RgbParam, Texture, TextureId, UvTransform, Wrap};
 
@@ -225,4 +225,43 @@ fn lights() {
     let LightDesc::Environment { image, scale, to_world } = &lights[4] else { panic!() };
     assert_eq!((image.texels.as_slice(), *scale), (&[Rgb::ONE, Rgb::ZERO][..], Rgb::splat(3.0)));
     assert!(to_world.transform_vector3(DVec3::Z).abs_diff_eq(DVec3::X, 1e-12));
+}
+
+/// Two triangles with a red and a blue material, and a camera.
+fn gltf(camera: bool) -> String {
+    let scene_camera = if camera { r#"{"camera":0,"translation":[0,0,9]},"# } else { "" };
+    let nodes = if camera { "[0,1]" } else { "[0]" };
+    let cameras =
+        if camera { r#""cameras":[{"type":"perspective","perspective":{"yfov":0.5,"znear":0.1}}],"# } else { "" };
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":{nodes}}}],"nodes":[{scene_camera}{{"mesh":0}}],{cameras}
+        "materials":[{{"name":"red","emissiveFactor":[1,0,0]}},{{"name":"blue"}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}},{{"attributes":{{"POSITION":0}},"material":1}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}}]}}"#
+    )
+}
+
+#[test]
+fn gltf_files_are_opened_and_their_materials_replaced() {
+    let text = "gltf = 'sub/a.gltf'\n[materials.red]\nkind = 'conductor'\nmetal = 'Cu'
+        [[shapes]]\nkind = 'cube'\nmaterial = 'blue'";
+    let (scene, _) = scene(&[("s.toml", text.as_bytes()), ("sub/a.gltf", gltf(true).as_bytes())]);
+    assert_eq!(scene.shapes.len(), 3);
+    let of = |i: usize| scene.materials[scene.shapes[i].material.0 as usize];
+    assert!(matches!(of(0), Material::Conductor { .. }), "{:?}", of(0));
+    assert!(scene.shapes[0].emission.is_some(), "what it emits stays");
+    assert!(matches!(of(1), Material::Gltf { .. }) && scene.shapes[1].material == scene.shapes[2].material);
+    assert_eq!(scene.camera.to_world.translation, DVec3::new(0.0, 0.0, 9.0));
+    assert!(scene.lights.is_empty(), "nothing stands in for lights");
+}
+
+#[test]
+fn gltf_files_without_camera_need_one() {
+    let file = gltf(false);
+    let files: [(&str, &[u8]); 2] = [("s.toml", b"gltf = 'a.gltf'"), ("a.gltf", file.as_bytes())];
+    assert_error(&files, &["s.toml, line 1, column 1", "no camera"]);
+    assert_error(&[("s.toml", b"gltf = 'a.gltf'")], &["a.gltf"]);
+    assert_error(&[("s.toml", b"gltf = 'a.gltf'"), ("a.gltf", b"{}")], &["a.gltf"]);
 }
