@@ -83,3 +83,92 @@ pub fn reflect(w: Vec3, m: Vec3) -> Vec3 {
 pub fn refract(w: Vec3, m: Vec3, cos_t: f32, eta: f32) -> Vec3 {
     ((m * w.dot(m) - w) / eta - m * cos_t).normalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{cos, sin};
+
+    #[test]
+    fn glass_at_the_usual_angles() {
+        let r = |degrees: f32, eta| dielectric(cos(degrees.to_radians()), eta).reflectance;
+        assert!((r(0.0, 1.5) - 0.04).abs() < 1e-6);
+        // At Brewster's angle only the perpendicular half is reflected.
+        let brewster = sqr(1.25f32 / 3.25);
+        assert!((r(56.309_93, 1.5) - 0.5 * brewster).abs() < 1e-5);
+        assert!(r(90.0, 1.5) > 0.999_99 && r(42.0, 1.0 / 1.5) == 1.0 && r(41.0, 1.0 / 1.5) < 0.5);
+        // Nothing changes where nothing differs.
+        assert_eq!(dielectric(0.3, 1.0), Boundary { reflectance: 0.0, cos_t: 0.3 });
+    }
+
+    /// Stokes: the same from both sides of the boundary.
+    #[test]
+    fn both_sides_agree() {
+        for eta in [1.01, 1.33, 2.4, 0.6] {
+            for i in 1..100 {
+                let there = dielectric(i as f32 / 100.0, eta);
+                if there.cos_t > 0.05 {
+                    let back = dielectric(there.cos_t, 1.0 / eta);
+                    assert!((there.reflectance - back.reflectance).abs() < 1e-4, "{eta} {i}");
+                    assert!((back.cos_t - i as f32 / 100.0).abs() < 1e-4);
+                }
+            }
+        }
+    }
+
+    /// Against the Fresnel equations in complex numbers, in f64.
+    #[test]
+    fn metals_follow_the_complex_equations() {
+        type C = (f64, f64);
+        let mul = |a: C, b: C| (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0);
+        let ratio2 = |a: C, b: C| (a.0 * a.0 + a.1 * a.1) / (b.0 * b.0 + b.1 * b.1);
+        for (eta, k) in [(0.143, 3.983), (1.442, 1.603), (2.0, 0.0), (0.05, 0.1), (3.0, 9.0)] {
+            for i in 0..=50 {
+                let c = f64::from(i) / 50.0;
+                let (n, n2) = ((eta, k), mul((eta, k), (eta, k)));
+                // n cos_t = sqrt(n^2 - sin^2)
+                let (re, im) = (n2.0 - (1.0 - c * c), n2.1);
+                let modulus = (re * re + im * im).sqrt();
+                let q = ((0.5 * (modulus + re)).max(0.0).sqrt(), (0.5 * (modulus - re)).max(0.0).sqrt());
+                let perpendicular = ratio2((c - q.0, -q.1), (c + q.0, q.1));
+                let nnc = mul(n, (n.0 * c, n.1 * c));
+                let parallel = ratio2((nnc.0 - q.0, nnc.1 - q.1), (nnc.0 + q.0, nnc.1 + q.1));
+                let expected = 0.5 * (perpendicular + parallel);
+                let r = f64::from(conductor(c as f32, Rgb::splat(eta as f32), Rgb::splat(k as f32)).r);
+                assert!((r - expected).abs() < 2e-5, "{eta} + {k} i, cos {c}: {r}, expected {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn extreme_indices_stay_in_range() {
+        for index in [0.0, 1e-20, 1.0, 1e4] {
+            for k in [0.0, 1e-20, 1.0, 1e4] {
+                for c in [0.0, 1e-7, 0.5, 1.0] {
+                    let r = conductor(c, Rgb::splat(index), Rgb::splat(k)).r;
+                    assert!((0.0..=1.0).contains(&r), "{index} {k} {c}: {r}");
+                }
+            }
+        }
+        assert_eq!(conductor(0.4, Rgb::ZERO, Rgb::ONE), Rgb::ONE);
+    }
+
+    #[test]
+    fn refraction_obeys_snell() {
+        for degrees in [0.0f32, 10.0, 45.0, 80.0, 89.9] {
+            for eta in [1.5, 1.0, 0.9] {
+                let a = degrees.to_radians();
+                let (m, w) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.6 * cos(a), sin(a), 0.8 * cos(a)));
+                let boundary = dielectric(w.dot(m), eta);
+                if boundary.cos_t > 0.0 {
+                    let t = refract(w, m, boundary.cos_t, eta);
+                    // In the plane of incidence, on the other side, sin_t = sin_i / eta.
+                    assert!((t.length() - 1.0).abs() < 1e-6 && (t.dot(m) + boundary.cos_t).abs() < 1e-6);
+                    assert!((t.cross(m).length() * eta - w.cross(m).length()).abs() < 1e-5, "{degrees} {eta}");
+                    assert!(t.cross(m).dot(w).abs() < 1e-5 && t.dot(w) < 0.0);
+                }
+                assert!((reflect(w, m) + w - m * (2.0 * w.dot(m))).length() < 1e-6);
+            }
+        }
+    }
+}

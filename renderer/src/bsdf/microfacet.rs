@@ -185,3 +185,78 @@ fn polynomial(c: &[f32; 9], t: f32) -> f32 {
     let odd = ((c[1] * t2 + c[3]) * t2 + c[5]) * t2 + c[7];
     even + odd * t
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{cos, erf64, sin};
+
+    fn distributions() -> Vec<Microfacet> {
+        let mut all = Vec::new();
+        for distribution in [Distribution::Ggx, Distribution::Beckmann] {
+            for (u, v) in [(0.1, 0.1), (0.5, 0.5), (1.0, 1.0), (0.2, 0.6)] {
+                all.push(Microfacet { distribution, alpha: Vec2::new(u, v) });
+            }
+        }
+        all
+    }
+
+    /// Midpoint rule over the upper hemisphere.
+    fn hemisphere(f: impl Fn(Vec3) -> f32) -> f64 {
+        const N: usize = 300;
+        let mut sum = 0.0;
+        for i in 0..N {
+            let theta = (i as f32 + 0.5) / N as f32 * 0.5 * PI;
+            for j in 0..N {
+                let phi = (j as f32 + 0.5) / N as f32 * 2.0 * PI;
+                let w = Vec3::new(sin(theta) * cos(phi), sin(theta) * sin(phi), cos(theta));
+                sum += f64::from(f(w) * sin(theta));
+            }
+        }
+        sum * f64::from(PI * PI) / (N * N) as f64
+    }
+
+    /// The facets' projected areas add up to that of the surface, from above and from any side that sees them.
+    #[test]
+    fn facets_cover_the_surface() {
+        for m in distributions() {
+            let area = hemisphere(|wm| m.d(wm) * wm.z);
+            assert!((area - 1.0).abs() < 1e-3, "{m:?}: {area}");
+            for theta in [0.3f32, 1.2, 1.5] {
+                let w = Vec3::new(sin(theta) * 0.8, sin(theta) * 0.6, cos(theta));
+                let visible = hemisphere(|wm| m.g1_over_cos(w) * w.dot(wm).max(0.0) * m.d(wm));
+                assert!((visible - 1.0).abs() < 2e-3, "{m:?}, theta {theta}: {visible}");
+            }
+        }
+    }
+
+    #[test]
+    fn erf_is_undone() {
+        for i in -3000..=3000 {
+            let x = f64::from(i) * 1e-3;
+            let error = (erf_inverse(erf64(x)) - x).abs();
+            assert!(error < 2e-6 * x.abs() + 1e-12, "{x}: off by {error}");
+        }
+        assert!(erf_inverse(1.0).is_finite() && erf_inverse(-1.0) == -erf_inverse(1.0));
+    }
+
+    #[test]
+    fn narrow_lobes_are_smooth() {
+        assert_eq!(Microfacet::new(Distribution::Ggx, 0.0, 0.9e-3), None);
+        assert_eq!(Microfacet::new(Distribution::Ggx, 0.0, 0.5).map(|m| m.alpha), Some(Vec2::new(MIN_ALPHA, 0.5)));
+    }
+
+    /// The Beckmann masking function agrees with the rational fit of Walter et al. 2007 (0.35 % error).
+    #[test]
+    fn beckmann_masking_agrees_with_walters_fit() {
+        let m = Microfacet { distribution: Distribution::Beckmann, alpha: Vec2::splat(0.4) };
+        for i in 1..157 {
+            let theta = i as f32 * 0.01;
+            let w = Vec3::new(sin(theta), 0.0, cos(theta));
+            let a = cos(theta) / (sin(theta) * 0.4);
+            let fit = if a < 1.6 { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) } else { 1.0 };
+            let g1 = m.g1_over_cos(w) * w.z;
+            assert!((g1 / fit - 1.0).abs() < 5e-3, "theta {theta}: {g1}, fit {fit}");
+        }
+    }
+}

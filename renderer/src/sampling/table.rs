@@ -63,7 +63,8 @@ impl Discrete {
     #[inline]
     pub fn sample(&self, u: f32) -> Choice {
         // u < 1 keeps the target below the total in f64, so the entry found has a weight: its upper sum exceeds its lower.
-        let target = f64::from(u.clamp(0.0, ONE_MINUS_EPSILON)) * self.total();
+        let u = if u > 0.0 { u.min(ONE_MINUS_EPSILON) } else { 0.0 };
+        let target = f64::from(u) * self.total();
         let index = self.cumulative.partition_point(|&c| c <= target) - 1;
         let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
         let rest = ((target - low) / (high - low)) as f32;
