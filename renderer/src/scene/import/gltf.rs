@@ -11,7 +11,8 @@
 //!   of a light is ignored.
 //! * A transmitting material is thin unless `KHR_materials_volume` gives it a thickness; then it refracts. Attenuation is ignored.
 //! * The camera is the first perspective one of the scene, a pinhole; `aspectRatio` proposes the picture's width at 720 lines.
-//! * Without a camera, one that frames the scene stands in; without light, a constant environment of radiance 1. Both are said.
+//! * Without a camera, one that frames the scene stands in; without light, soft light from all around. Both are said.
+//! * Nodes hidden by `KHR_node_visibility` are left out with all below them.
 //! * Skins, morph targets, animations and vertex colours are ignored, alpha is taken as opaque; each is said.
 //! * Tangents follow the texture coordinates; a TANGENT attribute is not read.
 

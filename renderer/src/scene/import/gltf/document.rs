@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::sync::Arc;
 
 /// Extensions that are honoured, or that change nothing here.
-const SUPPORTED: [&str; 10] = [
+const SUPPORTED: [&str; 11] = [
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -15,6 +15,7 @@ const SUPPORTED: [&str; 10] = [
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
     "EXT_mesh_gpu_instancing",
     "KHR_xmp_json_ld",

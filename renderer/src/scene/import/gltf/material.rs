@@ -9,7 +9,7 @@ use crate::bsdf::{Material, MaterialId};
 use crate::scene::desc::Emission;
 use crate::scene::import::image::ImageKind;
 use crate::spectrum::Rgb;
-use crate::texture::{FloatParam, RgbParam, TextureId};
+use crate::texture::{FloatParam, RgbParam, Texture, TextureId};
 use gltf::json;
 use gltf::json::material::AlphaMode;
 use gltf::json::validation::Checked as Valid;
@@ -193,6 +193,12 @@ impl Importer<'_> {
         }
     }
 
+    /// Whether every texel is black: exporters write such textures beside a factor of one.
+    fn is_black(&self, id: TextureId) -> bool {
+        let Texture::Image { image, .. } = &self.scene.textures[id.0 as usize] else { return false };
+        image.texels.iter().all(|t| t.is_black())
+    }
+
     /// Emissive factor, texture and KHR_materials_emissive_strength: a radiance in the scene's units.
     fn emission(&mut self, m: &mut Reading<'_>) -> Option<Emission> {
         let place = format!("{}.emissiveFactor", m.place);
@@ -208,6 +214,10 @@ impl Importer<'_> {
         let factor = (factor * strength).map(|v| v.min(MOST_RADIANCE));
         let texture = m.json.emissive_texture.as_ref();
         let radiance = self.colour(m, texture, factor, &format!("{}.emissiveTexture", m.place));
-        (!factor.is_black()).then_some(Emission { radiance, two_sided: m.json.double_sided })
+        let black = match radiance {
+            RgbParam::Const(c) => c.is_black(),
+            RgbParam::Texture(id, factor) => factor.is_black() || self.is_black(id),
+        };
+        (!black).then_some(Emission { radiance, two_sided: m.json.double_sided })
     }
 }

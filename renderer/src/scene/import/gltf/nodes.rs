@@ -29,6 +29,9 @@ impl Importer<'_> {
                 self.report.fault(Fault::new(place, message).help("remove the cycle or the second parent"));
                 continue;
             }
+            if hidden(node) {
+                continue;
+            }
             let own = format!("nodes[{index}]");
             let Some(to_world) = self.report.check(local(node, &own).and_then(|l| finite(parent * l, &own))) else {
                 continue;
@@ -207,6 +210,12 @@ impl Importer<'_> {
             (low.as_dvec3(), high.as_dvec3())
         })
     }
+}
+
+/// KHR_node_visibility: whether the node and all below it are not to be seen.
+fn hidden(node: &json::Node) -> bool {
+    let extension = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
+    extension.and_then(|e| e.get("visible")).is_some_and(|v| v == &serde_json::Value::Bool(false))
 }
 
 /// A node's own transform: its matrix, or translation * rotation * scale.

@@ -106,6 +106,17 @@ fn unlit_surfaces_emit_their_base_colour() {
 }
 
 #[test]
+fn a_black_emissive_texture_is_no_light() {
+    let mut file = File::with_material(json!({ "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 } }));
+    assert!(file.load().0.shapes[0].emission.is_some());
+    let view = file.view(&png(&[0; 6]));
+    file.json["images"][0] = json!({ "bufferView": view });
+    let (scene, warnings) = file.load();
+    assert_eq!(scene.shapes[0].emission, None);
+    assert!(says(&warnings, &["there is no light"]));
+}
+
+#[test]
 fn samplers() {
     let mut file = File::with_material(json!({ "normalTexture": { "index": 0 } }));
     let mut check = |sampler: Value, wrap: [Wrap; 2], filter: Filter| {

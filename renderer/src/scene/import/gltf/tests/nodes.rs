@@ -119,6 +119,17 @@ fn flattened_meshes_are_kept_and_vanished_ones_left_out() {
 }
 
 #[test]
+fn hidden_nodes_are_left_out_with_their_children() {
+    let mut file = File::triangle();
+    file.root(json!({ "children": [2], "extensions": { "KHR_node_visibility": { "visible": false } } }));
+    file.add("nodes", json!({ "mesh": 0 }));
+    file.json["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    assert_eq!(file.load().0.shapes.len(), 1);
+    file.json["nodes"][1]["extensions"]["KHR_node_visibility"]["visible"] = json!(true);
+    assert_eq!(file.load().0.shapes.len(), 2);
+}
+
+#[test]
 fn transforms_must_stay_finite() {
     for (key, value, words) in [
         ("matrix", json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2]), "last row"),

@@ -1,5 +1,5 @@
 use super::*;
-use crate::math::{DAffine3, DVec3, tan64};
+use crate::math::{DAffine3, DVec3, cos64, sin64, tan64};
 use crate::scene::desc::{FovAxis, LightDesc, SpotFalloff};
 use crate::spectrum::Rgb;
 
@@ -54,6 +54,31 @@ fn the_stand_in_camera_sees_everything() {
         }
         assert!(widest <= 1.0 && widest > 0.2, "{scale:?}: {widest}");
     }
+}
+
+#[test]
+fn the_stand_in_light_has_a_bright_side() {
+    let (scene, _) = File::triangle().load();
+    let [LightDesc::Environment { image, .. }] = &scene.lights[..] else { panic!() };
+    let at = |x: u32, y: u32| image.texels[(y * image.width + x) as usize].r;
+    // Zenith and nadir away from the key light.
+    assert!((at(64, 0) - 0.8).abs() < 0.05 && (at(64, 63) - 0.2).abs() < 0.01);
+    let brightest = (0..image.texels.len()).max_by(|a, b| image.texels[*a].r.total_cmp(&image.texels[*b].r)).unwrap();
+    let (x, y) = (brightest as u32 % image.width, brightest as u32 / image.width);
+    // (-0.5, 0.8, 0.6): u = 0.5 + atan2(-0.5, -0.6) / 2 pi, elevation 46 degrees.
+    let (u, v) = ((x as f32 + 0.5) / image.width as f32, (y as f32 + 0.5) / image.height as f32);
+    assert!((u - 0.110_6).abs() < 0.01 && (v - 0.243).abs() < 0.02, "{u} {v}");
+    // Irradiance on a surface that faces it, over pi: what white paper sends back.
+    let key = DVec3::new(-0.5, 0.8, 0.6).normalize();
+    let mut sum = 0.0;
+    for (i, t) in image.texels.iter().enumerate() {
+        let (x, y) = ((i % 128) as f64, (i / 128) as f64);
+        let (phi, theta) = (((x + 0.5) / 128.0 - 0.5) * std::f64::consts::TAU, (y + 0.5) / 64.0 * std::f64::consts::PI);
+        let d = DVec3::new(sin64(theta) * sin64(phi), cos64(theta), -sin64(theta) * cos64(phi));
+        let solid_angle = std::f64::consts::TAU / 128.0 * std::f64::consts::PI / 64.0 * sin64(theta);
+        sum += f64::from(t.r) * d.dot(key).max(0.0) * solid_angle;
+    }
+    assert!((sum / std::f64::consts::PI - 1.1).abs() < 0.05, "{}", sum / std::f64::consts::PI);
 }
 
 #[test]
