@@ -14,8 +14,10 @@ use std::sync::Arc;
 
 /// Height in pixels of a picture whose camera says its aspect ratio.
 const HEIGHT: f32 = 720.0;
-/// Full angle of the stand-in camera over the shorter side, degrees.
-const STAND_IN_FOV: f64 = 40.0;
+/// Full angle of the stand-in camera over the picture's width, degrees.
+const STAND_IN_FOV: f64 = 56.0;
+/// Height over width of the widest picture in which it still sees everything.
+const STAND_IN_ASPECT: f64 = 9.0 / 16.0;
 /// Intensities beyond this could not be summed over a scene in f32.
 const MOST_INTENSITY: f32 = 1e20;
 
@@ -137,24 +139,25 @@ fn studio() -> Image {
     Image { width, height, texels: (0..width * height).map(texel).collect(), alpha: Vec::new() }
 }
 
-/// A camera in front of the box (towards +Z) and above it that has all of it in the picture, whatever the picture's shape.
+/// A camera in front of the box (towards +Z) and above it that has all of it in the picture, be it 16:9 or narrower.
 fn framing(low: DVec3, high: DVec3) -> CameraDesc {
     let centre = (low + high) * 0.5;
     let back = DVec3::new(0.25, 0.45, 1.0).normalize();
     let right = DVec3::Y.cross(back).normalize();
     let up = back.cross(right);
     let slope = tan64(STAND_IN_FOV.to_radians() * 0.5);
+    let steep = slope * STAND_IN_ASPECT;
     let half = (high - low) * 0.5;
-    // The farthest that any corner asks for: in view when |x| and |y| stay below (distance - z) * slope.
+    // The farthest that any corner asks for: in view when |x| and |y| stay below (distance - z) times their slope.
     let corners =
         (0..8).map(|i| half * DVec3::from_array([0, 1, 2].map(|bit| if i >> bit & 1 == 1 { 1.0 } else { -1.0 })));
-    let wanted = corners.map(|c| c.dot(back) + c.dot(right).abs().max(c.dot(up).abs()) / slope);
+    let wanted = corners.map(|c| c.dot(back) + (c.dot(right).abs() / slope).max(c.dot(up).abs() / steep));
     let distance = 1.05 * wanted.fold(0.0, f64::max);
     let distance = if distance > 0.0 { distance } else { 1.0 };
     CameraDesc {
         to_world: DAffine3 { matrix3: DMat3::from_cols(right, up, back), translation: centre + back * distance },
         fov: STAND_IN_FOV,
-        fov_axis: FovAxis::Smaller,
+        fov_axis: FovAxis::X,
         aperture_radius: 0.0,
         focus_distance: distance,
     }
