@@ -10,6 +10,7 @@ mod reciprocity;
 mod shading;
 
 use renderer::math::{Vec3, sin_cos};
+use renderer::sampling::mix64;
 
 /// Chance of a false alarm of each test function here, all its comparisons together.
 const SIGNIFICANCE: f64 = 0.01;
@@ -25,4 +26,9 @@ fn views() -> Vec<Vec3> {
     let angles =
         [(0.0, 0.0), (30.0, 0.4), (60.0, 2.1), (85.0, 4.0), (89.0, 5.5), (91.0, 1.0), (120.0, 3.0), (165.0, 0.2)];
     angles.iter().map(|&(theta, phi)| direction(theta, phi)).collect()
+}
+
+/// Key of an example's random numbers: other entries of the roster don't change it.
+fn key(name: &str) -> u64 {
+    name.bytes().fold(0, |key, byte| mix64(key ^ u64::from(byte)))
 }

@@ -110,10 +110,12 @@ impl Integrand<'_> {
         // Nodes that all miss a peak agree with each other; drawn directions don't.
         let share: f64 = seeds.iter().map(|s| s.share).sum();
         let largest = seeds.iter().map(|s| s.share).fold(one, f64::max);
-        let missed = (share - sum).abs() > 4.0 * (largest * (share + sum)).sqrt() + tolerance;
-        let agrees = (sum - whole).abs() <= tolerance && !missed;
-        // Where much is at stake the next level must agree too: a single match can be luck.
-        if level == MAX_LEVEL || (agrees && (sure || sum < 100.0 * one)) {
+        let missed = (share - sum).abs() > 4.0 * (largest * (share + sum)).sqrt() + tolerance
+            || (share > 3.0 * largest && sum < 0.25 * share);
+        // Near agreement can be luck, and the same in every cell of a symmetric density: then the next level must agree too.
+        let difference = (sum - whole).abs();
+        let agrees = difference <= tolerance && !missed;
+        if level == MAX_LEVEL || (agrees && (sure || difference <= 1e-4 * sum)) {
             return sum;
         }
         quarters

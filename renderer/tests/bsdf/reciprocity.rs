@@ -1,13 +1,19 @@
 //! Reciprocity: light and importance see one BSDF.
 
+use crate::key;
 use renderer::bsdf::{Bsdf, Transport, roster};
 use renderer::math::Vec3;
 use renderer::sampling::{IndependentSampler, Sampler, warp};
 use renderer::spectrum::Rgb;
 
-/// Largest relative difference that f32 directions explain. Refraction at indices near one magnifies their rounding.
-fn close(a: Rgb, b: Rgb) -> bool {
-    (0..3).all(|c| (a[c] - b[c]).abs() <= 1e-3 * a[c].max(b[c]) + 1e-7)
+/// Whether two values differ by no more than the rounding of f32 directions explains, relatively.
+fn close(a: Rgb, b: Rgb, tolerance: f32) -> bool {
+    (0..3).all(|c| (a[c] - b[c]).abs() <= tolerance * a[c].max(b[c]) + 1e-7)
+}
+
+/// That difference: narrow lobes and indices near one magnify the rounding.
+fn tolerance(name: &str) -> f32 {
+    if name.contains("0.002") || name.contains("matched") { 2e-2 } else { 1e-3 }
 }
 
 /// Pairs of directions, half of them drawn from the BSDF, where most of its energy is.
@@ -28,15 +34,14 @@ fn pairs(bsdf: &Bsdf, seed: u64) -> Vec<(Vec3, Vec3)> {
 
 #[test]
 fn importance_is_the_adjoint_of_radiance() {
-    for (e, example) in roster().iter().enumerate() {
-        let narrow = example.name.contains("0.002") || example.name.contains("matched");
+    for example in &roster() {
         let mut seen = 0;
-        for (a, b) in pairs(&example.bsdf, e as u64) {
+        for (a, b) in pairs(&example.bsdf, key(&example.name)) {
             let importance = example.bsdf.eval(a, b, Transport::Importance);
             let radiance = example.bsdf.eval(b, a, Transport::Radiance);
             seen += usize::from(!importance.is_black());
             assert!(
-                close(importance, radiance) || narrow,
+                close(importance, radiance, tolerance(&example.name)),
                 "{}: {a} -> {b}: importance {importance:?}, radiance back {radiance:?}",
                 example.name
             );
@@ -48,11 +53,15 @@ fn importance_is_the_adjoint_of_radiance() {
 /// Reflection is symmetric in both modes.
 #[test]
 fn reflection_is_symmetric() {
-    for (e, example) in roster().iter().enumerate() {
-        for (a, b) in pairs(&example.bsdf, 100 + e as u64).into_iter().filter(|(a, b)| a.z * b.z > 0.0) {
+    for example in &roster() {
+        for (a, b) in pairs(&example.bsdf, !key(&example.name)).into_iter().filter(|(a, b)| a.z * b.z > 0.0) {
             for mode in [Transport::Radiance, Transport::Importance] {
                 let (there, back) = (example.bsdf.eval(a, b, mode), example.bsdf.eval(b, a, mode));
-                assert!(close(there, back), "{}: {a} -> {b}: {there:?}, back {back:?}", example.name);
+                assert!(
+                    close(there, back, tolerance(&example.name)),
+                    "{}: {a} -> {b}: {there:?}, back {back:?}",
+                    example.name
+                );
             }
         }
     }
@@ -71,7 +80,11 @@ fn refraction_scales_radiance_by_the_squared_index() {
                 };
                 let scale = if radiance.lobe.transmission { radiance.eta * radiance.eta } else { 1.0 };
                 assert_eq!((radiance.wi, radiance.lobe), (importance.wi, importance.lobe), "{}", example.name);
-                assert!(close(radiance.f * scale, importance.f), "{}: {radiance:?}, {importance:?}", example.name);
+                assert!(
+                    close(radiance.f * scale, importance.f, 1e-5),
+                    "{}: {radiance:?}, {importance:?}",
+                    example.name
+                );
             }
         }
     }
