@@ -92,7 +92,7 @@ fn the_guard_sees_memory_and_panics() {
     let _alone = alone();
     let hungry = std::panic::catch_unwind(|| {
         guarded("hungry", || {
-            drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST + 1)));
+            drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST + LARGEST / 8)));
             Outcome::Loaded
         })
     });

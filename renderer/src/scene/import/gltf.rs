@@ -58,7 +58,7 @@ struct Importer<'a> {
     file: &'a str,
     report: Report<'a>,
     scene: SceneDesc,
-    mesh_ids: BTreeMap<MeshKey, Option<MeshId>>,
+    mesh_ids: BTreeMap<MeshKey, Checked<Option<MeshId>>>,
     mesh_boxes: BTreeMap<MeshId, (DVec3, DVec3)>,
     mesh_bytes_left: u64,
     images: BTreeMap<(usize, ImageKind), Checked<Arc<Image>>>,
@@ -66,6 +66,8 @@ struct Importer<'a> {
     texture_ids: BTreeMap<TextureKey, TextureId>,
     surfaces: BTreeMap<Option<usize>, Surface>,
     has_camera: bool,
+    /// Placed primitives so far, also those that came to nothing.
+    placed: usize,
     /// Of all placed meshes, world space.
     bounds: (DVec3, DVec3),
 }
@@ -112,6 +114,7 @@ fn load(files: &dyn FileSource, root: &str, diagnostics: &mut Diagnostics, stand
         texture_ids: BTreeMap::new(),
         surfaces: BTreeMap::new(),
         has_camera: false,
+        placed: 0,
         bounds: (DVec3::INFINITY, DVec3::NEG_INFINITY),
     };
     if !importer.report.failed() {

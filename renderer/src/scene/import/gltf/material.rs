@@ -3,7 +3,7 @@
 use super::Importer;
 use super::buffers::lookup;
 use super::document::is_supported;
-use super::report::{Checked, Fault};
+use super::report::{Checked, Fault, shorten};
 use super::texture::TextureUse;
 use crate::bsdf::{Material, MaterialId};
 use crate::scene::desc::Emission;
@@ -94,7 +94,7 @@ impl Importer<'_> {
 
     /// Warns of what the material has and the renderer lacks.
     fn note_material(&mut self, m: &Reading<'_>) {
-        let name = m.json.name.as_ref().map_or(m.place.clone(), |n| format!("{} ({n:?})", m.place));
+        let name = m.json.name.as_ref().map_or(m.place.clone(), |n| format!("{} ({:?})", m.place, shorten(n)));
         if matches!(m.json.alpha_mode, Valid::Valid(AlphaMode::Mask | AlphaMode::Blend)) {
             self.report.sum("alphaMode is not supported; the material is rendered opaque", "", &name);
         }
@@ -102,7 +102,7 @@ impl Importer<'_> {
         let typed = extensions.specular.as_ref().map(|_| "KHR_materials_specular");
         for extension in extensions.others.keys().map(String::as_str).chain(typed) {
             if !is_supported(extension) {
-                self.report.sum(format!("{extension} is not supported and is ignored"), "", &name);
+                self.report.sum(format!("{} is not supported and is ignored", shorten(extension)), "", &name);
             }
         }
         let tinted = |v: &json::extensions::material::Volume| {

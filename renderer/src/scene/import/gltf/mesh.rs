@@ -67,13 +67,12 @@ impl Importer<'_> {
         };
         let indices = primitive.indices.map(|i| i.value());
         let key = MeshKey { positions, normals: attribute(Semantic::Normals), uvs, indices, mode: mode.as_gl_enum() };
-        if let Some(id) = self.mesh_ids.get(&key) {
-            return Ok(*id);
+        if let Some(known) = self.mesh_ids.get(&key) {
+            return known.clone();
         }
-        let made = self.build_mesh(&key, mode, &place)?;
-        let id = made.map(|mesh| self.add_mesh(mesh)).transpose()?;
-        self.mesh_ids.insert(key, id);
-        Ok(id)
+        let made = self.build_mesh(&key, mode, &place).and_then(|m| m.map(|mesh| self.add_mesh(mesh)).transpose());
+        self.mesh_ids.insert(key, made.clone());
+        made
     }
 
     /// Adds a mesh to the scene.

@@ -3,15 +3,15 @@
 use super::Importer;
 use super::accessor::{self, Accessor, Expect};
 use super::buffers::lookup;
-use super::report::{Checked, Fault};
+use super::report::{Checked, Fault, shorten};
 use crate::geometry::{Mesh, MeshId};
 use crate::math::{DAffine3, DMat3, DMat4, DVec3, Transform, Vec3};
 use crate::scene::desc::{ShapeDesc, ShapeKind};
 use glam::{DQuat, DVec4};
 use gltf::json;
 
-/// More placed objects than this are refused: a few bytes of JSON can ask for any number.
-const MOST_SHAPES: usize = 4_000_000;
+/// More placed primitives than this are refused: a few bytes of JSON can ask for any number.
+const MOST_PLACED: usize = 1 << 21;
 /// Coordinates beyond this would overflow f32 when squared.
 const FARTHEST: f64 = 1e18;
 
@@ -37,6 +37,9 @@ impl Importer<'_> {
                 continue;
             };
             self.content(index, node, to_world);
+            if self.placed > MOST_PLACED {
+                return Err(Fault::new(own, format!("more than {MOST_PLACED} objects are placed")));
+            }
             let children = node.children.as_deref().unwrap_or_default().iter().enumerate().rev();
             stack.extend(children.map(|(i, child)| (child.value(), to_world, format!("{own}.children[{i}]"))));
         }
@@ -88,16 +91,25 @@ impl Importer<'_> {
     /// Places every primitive of a mesh, once or once per instance.
     fn placed_mesh(&mut self, node: &json::Node, mesh: usize, to_world: DAffine3, own: &str) -> Checked<()> {
         let json = lookup(&self.root.meshes, mesh, &format!("{own}.mesh"), "meshes")?;
-        let name = node.name.as_ref().or(json.name.as_ref()).filter(|n| !n.is_empty()).map_or(own, String::as_str);
+        let name =
+            node.name.as_ref().or(json.name.as_ref()).filter(|n| !n.is_empty()).map_or(own.into(), |n| shorten(n));
         let instancing = node.extensions.as_ref().and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
-        let instances = instancing.map(|e| self.instances(e, to_world, own)).transpose()?;
-        let many = json.primitives.len() > 1;
+        let primitives = json.primitives.len();
+        let places = match instancing {
+            Some(extension) => self.instances(extension, to_world, own)?,
+            None => vec![to_world],
+        };
+        self.placed = self.placed.saturating_add(places.len().saturating_mul(primitives.max(1)));
+        if self.placed > MOST_PLACED {
+            return Ok(());
+        }
+        let many = primitives > 1;
         for (i, primitive) in json.primitives.iter().enumerate() {
             let place = format!("meshes[{mesh}].primitives[{i}]");
             let surface = self.surface(primitive.material.map(|m| m.value()), &format!("{place}.material"))?;
             let made = self.primitive(mesh, i, surface.uv_set);
             let Some(Some(id)) = self.report.check(made) else { continue };
-            let name = if many { format!("{name}/{i}") } else { name.to_string() };
+            let name = if many { format!("{name}/{i}") } else { name.clone() };
             let shape = |name: String, to_world| ShapeDesc {
                 name,
                 kind: ShapeKind::Mesh(id),
@@ -106,20 +118,16 @@ impl Importer<'_> {
                 material: surface.material,
                 emission: surface.emission,
             };
-            match &instances {
-                None => self.place(shape(name, to_world), id, own)?,
-                Some(list) => {
-                    for (k, to_world) in list.iter().enumerate() {
-                        self.place(shape(format!("{name}#{k}"), *to_world), id, own)?;
-                    }
-                }
+            for (k, to_world) in places.iter().enumerate() {
+                let name = if instancing.is_some() { format!("{name}#{k}") } else { name.clone() };
+                self.place(shape(name, *to_world), id, own)?;
             }
         }
         Ok(())
     }
 
     /// EXT_mesh_gpu_instancing: translation, rotation and scale per instance, applied before the node's own transform.
-    fn instances(&self, extension: &serde_json::Value, to_world: DAffine3, own: &str) -> Checked<Vec<DAffine3>> {
+    fn instances(&mut self, extension: &serde_json::Value, to_world: DAffine3, own: &str) -> Checked<Vec<DAffine3>> {
         let place = format!("{own}.extensions.EXT_mesh_gpu_instancing.attributes");
         let attributes = extension.get("attributes").and_then(|a| a.as_object());
         let attributes = attributes.ok_or_else(|| Fault::new(&place, "expected an object"))?;
@@ -138,25 +146,22 @@ impl Importer<'_> {
         if counts.any(|c| c != count) {
             return Err(Fault::new(place, "TRANSLATION, ROTATION and SCALE must have the same count"));
         }
-        if count > MOST_SHAPES {
-            return Err(Fault::new(place, format!("{count} instances are too many; the limit is {MOST_SHAPES}")));
+        if count > MOST_PLACED - self.placed {
+            self.placed = usize::MAX;
+            return Ok(Vec::new());
         }
-        (0..count)
-            .map(|i| {
-                let at = format!("{place} (instance {i})");
-                let translation = translation.as_ref().map_or([0.0; 3], |a| a.floats(i));
-                let rotation = rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |a| a.floats(i));
-                let scale = scale.as_ref().map_or([1.0; 3], |a| a.floats(i));
-                finite(to_world * compose(translation, rotation, scale, &at)?, &at)
-            })
-            .collect()
+        let one = |i: usize| {
+            let translation = translation.as_ref().map_or([0.0; 3], |a| a.floats(i));
+            let rotation = rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |a| a.floats(i));
+            let scale = scale.as_ref().map_or([1.0; 3], |a| a.floats(i));
+            finite(to_world * compose(translation, rotation, scale, &place)?, &place)
+        };
+        let numbered = |i: usize| one(i).map_err(|e| Fault::new(format!("{} (instance {i})", e.place), e.message));
+        (0..count).map(numbered).collect()
     }
 
     /// Adds a placed mesh. Where its transform can't be inverted (flattened meshes are common) it is applied to a copy of the mesh.
     fn place(&mut self, mut shape: ShapeDesc, mesh: MeshId, own: &str) -> Checked<()> {
-        if self.scene.shapes.len() >= MOST_SHAPES {
-            return Err(Fault::new(own, format!("more than {MOST_SHAPES} objects are placed")));
-        }
         if Transform::new(shape.to_world).is_none() {
             let Some(baked) = self.bake(mesh, shape.to_world, own)? else {
                 self.report.sum("the mesh is scaled to nothing and is left out", "", own);

@@ -5,6 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Faults (and, apart, warnings) of one file beyond this number are only counted: a hostile file could hold millions.
 const MOST: usize = 100;
+/// Characters that are kept of a text from the file (a name, say), and of a message: a hostile file could hold a name of megabytes.
+const LONGEST_NAME: usize = 80;
+const LONGEST_MESSAGE: usize = 1000;
 /// Places listed in a summary before "and more".
 const MOST_PLACES: usize = 8;
 
@@ -22,13 +25,25 @@ pub(super) struct Fault {
 impl Fault {
     /// A fault whose message says it all.
     pub(super) fn new(place: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { place: place.into(), message: message.into(), help: String::new() }
+        Self { place: place.into(), message: cut(&message.into(), LONGEST_MESSAGE), help: String::new() }
     }
 
     /// With advice.
     pub(super) fn help(mut self, help: impl Into<String>) -> Self {
         self.help = help.into();
         self
+    }
+}
+
+/// A text from the file, cut to a length that is fit for a name.
+pub(super) fn shorten(text: &str) -> String {
+    cut(text, LONGEST_NAME)
+}
+
+fn cut(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_string(),
     }
 }
 

@@ -171,6 +171,47 @@ fn an_endless_list_of_faults_is_cut() {
 }
 
 #[test]
+fn a_few_bytes_can_not_ask_for_endless_work() {
+    let started = std::time::Instant::now();
+    // Ten thousand nodes that each use a mesh of ten thousand primitives without triangles.
+    let mut file = File::triangle();
+    let lines = json!({ "attributes": { "POSITION": 0 }, "mode": 1 });
+    file.add("meshes", json!({ "primitives": vec![lines; 10_000] }));
+    file.json["nodes"].as_array_mut().unwrap().extend(vec![json!({ "mesh": 1 }); 10_000]);
+    file.json["scenes"][0]["nodes"] = (0..10_001).collect();
+    assert!(says(&file.errors(), &["more than 2097152 objects"]));
+    // Instances at a point, without a byte of their own.
+    let mut file = File::triangle();
+    file.add("accessors", json!({ "componentType": F32, "count": 1_500_000, "type": "VEC3" }));
+    let extension = json!({ "EXT_mesh_gpu_instancing": { "attributes": { "SCALE": 2 } } });
+    file.json["nodes"] = vec![json!({ "mesh": 0, "extensions": extension }); 1000].into();
+    file.json["scenes"][0]["nodes"] = (0..1000).collect();
+    assert!(says(&file.errors(), &["more than 2097152 objects"]));
+    // A mesh that turns out to be faulty at its end.
+    let mut file = File::new();
+    let mut corners = vec![0.0; 300_000];
+    corners[299_999] = f32::NAN;
+    let positions = file.floats("VEC3", &corners);
+    file.add("meshes", json!({ "primitives": [{ "attributes": { "POSITION": positions } }] }));
+    file.json["nodes"] = vec![json!({ "mesh": 0 }); 10_000].into();
+    file.json["scenes"][0]["nodes"] = (0..10_000).collect();
+    assert!(says(&file.errors(), &["vertex 99999"]));
+    assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
+}
+
+#[test]
+fn long_names_are_cut() {
+    let mut file = File::with_material(json!({ "name": "m".repeat(100_000), "alphaMode": "MASK" }));
+    file.json["nodes"][0]["name"] = json!("ü".repeat(100_000));
+    let (scene, warnings) = file.load();
+    assert_eq!(scene.shapes[0].name.chars().count(), 83);
+    assert!(warnings.iter().all(|w| w.len() < 2000));
+    file.json["images"][0]["uri"] = json!("x".repeat(100_000));
+    file.json["materials"][0]["normalTexture"] = json!({ "index": 0 });
+    assert!(file.errors().iter().all(|e| e.len() < 2000));
+}
+
+#[test]
 fn a_file_without_triangles_is_refused() {
     assert!(says(&File::new().errors(), &["nothing to show"]));
 }
