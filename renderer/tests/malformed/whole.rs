@@ -2,22 +2,32 @@
 
 use crate::guard::Outcome;
 use renderer::bsdf::Material;
+use renderer::diagnostics::SceneError;
+use renderer::job::{LocalOptions, RenderOptions, RenderSettings, Stop, render_local};
 use renderer::math::Transform;
+use renderer::scene::Scene;
 use renderer::scene::bundle::FileSource;
 use renderer::scene::desc::{SceneDesc, ShapeKind};
 use renderer::scene::import::image::{ImageKind, decode_image};
 use renderer::scene::import::load;
 use renderer::texture::{FloatParam, RgbParam, Texture, TextureId};
 
-/// Loads a scene and checks it.
+/// Loads a scene, checks it, builds it and renders a few paths.
 pub fn load_scene(files: &dyn FileSource, root: &str, name: &str) -> Outcome {
-    match load(files, root) {
-        Ok((scene, _)) => {
-            check(&scene, name);
-            Outcome::Loaded
-        }
-        Err(e) => Outcome::Refused(e.to_string()),
-    }
+    let (description, mut diagnostics) = match load(files, root) {
+        Ok(loaded) => loaded,
+        Err(e) => return Outcome::Refused(e.to_string()),
+    };
+    check(&description, name);
+    let Some(scene) = Scene::build(description, root, &mut diagnostics) else {
+        return Outcome::Refused(SceneError(diagnostics.list).to_string());
+    };
+    let options = RenderOptions { spp: Some(1), size: Some((12, 8)), max_depth: Some(6), ..RenderOptions::default() };
+    let settings = RenderSettings::resolve(&options, &scene.defaults).unwrap();
+    let threads = LocalOptions { threads: 1 };
+    let image = render_local(&scene, &settings, &threads, &Stop::new(), &mut |_| {}).unwrap().image;
+    assert!(image.mean.iter().flatten().all(|v| v.is_finite() && *v >= 0.0), "{name}: what is not finite is dropped");
+    Outcome::Loaded
 }
 
 /// Decodes a picture as colour and as data, which take different ways to the texels.
