@@ -36,6 +36,21 @@ impl Default for Tuning {
     }
 }
 
+/// What was counted since the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Totals {
+    /// Units accepted.
+    pub accepted: u64,
+    /// Their compute time.
+    pub seconds: f64,
+    /// Units that failed.
+    pub failures: u64,
+    /// Leases given out.
+    pub leases: u64,
+    /// Leases lost with their worker.
+    pub losses: u64,
+}
+
 /// The scheduler.
 #[derive(Debug)]
 pub struct Farm {
@@ -46,6 +61,7 @@ pub struct Farm {
     /// Workers whose call should be looked at again.
     pub(crate) wakes: BTreeSet<WorkerId>,
     orders: u64,
+    pub(crate) totals: Totals,
 }
 
 impl Farm {
@@ -58,6 +74,7 @@ impl Farm {
             workers: BTreeMap::new(),
             wakes: BTreeSet::new(),
             orders: 0,
+            totals: Totals::default(),
         }
     }
 
@@ -74,6 +91,11 @@ impl Farm {
     /// The workers.
     pub fn workers(&self) -> &BTreeMap<WorkerId, Worker> {
         &self.workers
+    }
+
+    /// What was counted since the start.
+    pub fn totals(&self) -> Totals {
+        self.totals
     }
 
     /// Workers whose waiting call should be looked at again.
@@ -228,6 +250,7 @@ impl Farm {
         let leases = std::mem::take(&mut w.leases);
         if state == WorkerState::Lost {
             w.losses += leases.len() as u32;
+            self.totals.losses += leases.len() as u64;
         }
         if leases.is_empty() {
             return;
@@ -280,3 +303,7 @@ impl Farm {
         list
     }
 }
+
+#[cfg(test)]
+#[path = "farm_tests.rs"]
+mod tests;

@@ -1,10 +1,11 @@
 //! What the services share: the farm behind a lock, the store, the blobs, the merge, and the calls that wait.
 
 use crate::blobs::Blobs;
-use crate::farm::{Farm, Tuning};
+use crate::farm::Farm;
 use crate::ids::{JobId, WorkerId};
 use crate::job::{Job, JobState};
 use crate::merge::{MergeQueue, Snapshot};
+use crate::serve::Config;
 use crate::store::{Change, Store, StoreError, received};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -33,6 +34,8 @@ pub struct Hub {
     pub submitting: tokio::sync::Mutex<()>,
     /// What workers must have in common with this coordinator.
     pub fingerprint: String,
+    /// See [`Config::checkpoint_bytes`].
+    pub checkpoint_bytes: u64,
 }
 
 /// Why a job can't change its state.
@@ -48,9 +51,9 @@ pub enum ControlError {
 
 impl Hub {
     /// Over an opened data folder.
-    pub fn new(generation: u32, store: Store, blobs: Blobs, merge: MergeQueue, tuning: Tuning, print: String) -> Self {
+    pub fn new(config: &Config, generation: u32, store: Store, blobs: Blobs, merge: MergeQueue) -> Self {
         Self {
-            farm: Mutex::new(Farm::new(tuning, generation)),
+            farm: Mutex::new(Farm::new(config.tuning, generation)),
             waiting: Mutex::default(),
             started: Instant::now(),
             store,
@@ -58,7 +61,8 @@ impl Hub {
             merge,
             budget: Arc::new(Semaphore::new(BUDGET_KIB)),
             submitting: Default::default(),
-            fingerprint: print,
+            fingerprint: config.fingerprint.clone(),
+            checkpoint_bytes: config.checkpoint_bytes,
         }
     }
 

@@ -1,11 +1,11 @@
 //! The units of one pass and who works on them: a pure state machine. Time comes in as an argument; nothing is read or written.
 //!
-//! Every unit is free, held (by at most two leases, of different workers) or done. Holding is only a hint about who should work on
+//! Every unit is free, held (by one lease or more, of different workers) or done. Holding is only a hint about who should work on
 //! what: a result counts whoever brings it, once.
 
 use crate::ids::{Epoch, WorkerId};
 use crate::units::UnitSet;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -36,8 +36,8 @@ pub struct PassBoard {
     free: UnitSet,
     done: UnitSet,
     leases: BTreeMap<Epoch, Lease>,
-    /// The leases that hold a unit: one or two.
-    holders: BTreeMap<u32, (Epoch, Option<Epoch>)>,
+    /// The leases that hold a unit.
+    holders: BTreeMap<u32, Vec<Epoch>>,
 }
 
 impl PassBoard {
@@ -86,7 +86,7 @@ impl PassBoard {
     }
 
     /// Leases a second time what `thief` would finish sooner than who holds it: the last units, at most half, of the lease that ends
-    /// last. With `overdue` only where a lease has stood still for far longer than a unit takes.
+    /// last. With `overdue` only what nobody gets on with: held by leases that stand still for far longer than a unit takes.
     pub fn grant_second(
         &mut self,
         thief: WorkerId,
@@ -96,23 +96,28 @@ impl PassBoard {
         now: Duration,
         pace_of: impl Fn(WorkerId) -> Option<Pace>,
     ) -> Option<Range<u32>> {
+        let waited = |l: &Lease| now.saturating_sub(l.progress).as_secs_f64();
+        let its = |l: &Lease| pace_of(l.worker).unwrap_or(pace);
+        let stands_still = |l: &Lease| waited(l) > 4.0 * its(l).unit_seconds + 2.0;
+        let stalled: BTreeSet<Epoch> = self.leases.iter().filter(|(_, l)| stands_still(l)).map(|(e, _)| *e).collect();
+        let own: BTreeSet<Epoch> = self.leases.iter().filter(|(_, l)| l.worker == thief).map(|(e, _)| *e).collect();
+        // Two at a unit are enough as long as one of them gets on.
+        let open = |unit: u32| {
+            let Some(holders) = self.holders.get(&unit) else { return false };
+            let stuck = holders.iter().all(|e| stalled.contains(e));
+            (stuck || !overdue && holders.len() == 1) && !holders.iter().any(|e| own.contains(e))
+        };
         let mut best: Option<(f64, Range<u32>)> = None;
-        for lease in self.leases.values().filter(|l| l.worker != thief) {
-            let Some(range) = self.last_single(lease) else { continue };
+        for (e, lease) in self.leases.iter().filter(|(_, l)| l.worker != thief) {
+            let Some(range) = last_run(&lease.units, open) else { continue };
             // When its holder will be through, were it alone; never, if it stands still.
-            let its = pace_of(lease.worker).unwrap_or(pace);
-            let waited = now.saturating_sub(lease.progress).as_secs_f64();
-            let rounds = f64::from(lease.units.len().div_ceil(its.threads.max(1)));
-            let stands_still = waited > 4.0 * its.unit_seconds + 2.0;
-            let left = if stands_still { f64::INFINITY } else { rounds * its.unit_seconds - waited };
-            if overdue && !stands_still {
-                continue;
-            }
+            let rounds = f64::from(lease.units.len().div_ceil(its(lease).threads.max(1)));
+            let alone = rounds * its(lease).unit_seconds - waited(lease);
+            let left = if stalled.contains(e) { f64::INFINITY } else { alone };
             let n = (range.len() as u32).min(lease.units.len().div_ceil(2)).max(1);
-            let range = range.end - n..range.end;
             let needs = f64::from(n.div_ceil(pace.threads.max(1))) * pace.unit_seconds;
             if needs < left && best.as_ref().is_none_or(|(l, _)| left > *l) {
-                best = Some((left, range));
+                best = Some((left, range.end - n..range.end));
             }
         }
         let (_, range) = best?;
@@ -120,17 +125,9 @@ impl PassBoard {
         Some(range)
     }
 
-    /// The last run of a lease's units that nobody else holds.
-    fn last_single(&self, lease: &Lease) -> Option<Range<u32>> {
-        let single = |u: &u32| self.holders.get(u).is_some_and(|(_, second)| second.is_none());
-        let end = lease.units.iter().rev().find(single)? + 1;
-        let run = (0..end).rev().take_while(|u| lease.units.contains(*u) && single(u)).count() as u32;
-        Some(end - run..end)
-    }
-
     fn add_lease(&mut self, worker: WorkerId, epoch: Epoch, range: Range<u32>, now: Duration) {
         for unit in range.clone() {
-            self.holders.entry(unit).and_modify(|h| h.1 = Some(epoch)).or_insert((epoch, None));
+            self.holders.entry(unit).or_default().push(epoch);
         }
         self.leases.insert(epoch, Lease { worker, units: UnitSet::from_range(range), progress: now });
     }
@@ -147,7 +144,7 @@ impl PassBoard {
         }
         for unit in units.iter() {
             self.free.remove(unit);
-            self.holders.insert(unit, (epoch, None));
+            self.holders.insert(unit, vec![epoch]);
         }
         self.leases.insert(epoch, Lease { worker, units: units.clone(), progress: now });
         units
@@ -160,11 +157,9 @@ impl PassBoard {
         }
         self.free.remove(unit);
         let mut freed = Vec::new();
-        if let Some((first, second)) = self.holders.remove(&unit) {
-            for epoch in std::iter::once(first).chain(second) {
-                if let Some(worker) = self.forget(epoch, unit, now) {
-                    freed.push((epoch, worker));
-                }
+        for epoch in self.holders.remove(&unit).unwrap_or_default() {
+            if let Some(worker) = self.forget(epoch, unit, now) {
+                freed.push((epoch, worker));
             }
         }
         Some(freed)
@@ -200,18 +195,20 @@ impl PassBoard {
     }
 
     fn unhold(&mut self, epoch: Epoch, unit: u32) {
-        match self.holders.get(&unit).copied() {
-            Some((first, Some(second))) => {
-                let rest = if first == epoch { second } else { first };
-                self.holders.insert(unit, (rest, None));
-            }
-            Some((first, None)) if first == epoch => {
-                self.holders.remove(&unit);
-                self.free.insert(unit);
-            }
-            _ => {}
+        let Some(holders) = self.holders.get_mut(&unit) else { return };
+        holders.retain(|e| *e != epoch);
+        if holders.is_empty() {
+            self.holders.remove(&unit);
+            self.free.insert(unit);
         }
     }
+}
+
+/// The last run of units for which `open` holds.
+fn last_run(units: &UnitSet, open: impl Fn(u32) -> bool) -> Option<Range<u32>> {
+    let end = units.iter().rev().find(|u| open(*u))? + 1;
+    let run = (0..end).rev().take_while(|u| units.contains(*u) && open(*u)).count() as u32;
+    Some(end - run..end)
 }
 
 #[cfg(test)]

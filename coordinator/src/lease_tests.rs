@@ -35,8 +35,7 @@ fn check(board: &PassBoard) {
     for unit in 0..board.count() {
         let states = [board.free().contains(unit), board.done().contains(unit), held.contains_key(&unit)];
         assert_eq!(states.iter().filter(|s| **s).count(), 1, "unit {unit}: {states:?}");
-        let listed: BTreeSet<Epoch> =
-            board.holders.get(&unit).map(|(a, b)| std::iter::once(*a).chain(*b).collect()).unwrap_or_default();
+        let listed: BTreeSet<Epoch> = board.holders.get(&unit).into_iter().flatten().copied().collect();
         assert_eq!(listed, held.get(&unit).cloned().unwrap_or_default(), "unit {unit}");
         let workers: BTreeSet<WorkerId> = listed.iter().filter_map(|e| board.lease(*e)).map(|l| l.worker).collect();
         assert_eq!(workers.len(), listed.len(), "one worker holds unit {unit} twice");
@@ -142,10 +141,23 @@ fn a_second_lease_goes_where_it_helps() {
     let range = board.grant_second(worker(2), Epoch(3), FAST, false, seconds(0.5), pace_of);
     assert_eq!(range, Some(4..8));
     let range = board.grant_second(worker(3), Epoch(4), FAST, false, seconds(0.5), pace_of);
-    assert_eq!(range, Some(0..4), "no unit is held three times");
+    assert_eq!(range, Some(0..4), "two are enough while they get on");
     assert_eq!(board.grant_second(worker(2), Epoch(5), slow, false, seconds(0.5), pace_of), None, "it would be slower");
     assert_eq!(board.complete(5, seconds(0.6)), Some(vec![(Epoch(1), worker(0)), (Epoch(3), worker(2))]));
     // Only a lease that stands still is overdue.
     assert_eq!(board.grant_second(worker(3), Epoch(6), FAST, true, seconds(1.0), pace_of), None);
-    assert_eq!(board.grant_second(worker(3), Epoch(6), FAST, true, seconds(9.0), pace_of), Some(10..12));
+    assert_eq!(board.grant_second(worker(3), Epoch(6), FAST, true, seconds(9.0), pace_of), Some(6..8));
+}
+
+#[test]
+fn when_all_who_hold_a_unit_stand_still_another_gets_it() {
+    let mut board = PassBoard::new(1, UnitSet::default());
+    board.grant(worker(0), Epoch(1), 1, seconds(0.0));
+    assert_eq!(board.grant_second(worker(1), Epoch(2), FAST, true, seconds(10.0), |_| Some(FAST)), Some(0..1));
+    assert_eq!(board.grant_second(worker(2), Epoch(3), FAST, false, seconds(11.0), |_| Some(FAST)), None);
+    assert_eq!(board.grant_second(worker(1), Epoch(3), FAST, true, seconds(20.0), |_| Some(FAST)), None, "its own");
+    assert_eq!(board.grant_second(worker(2), Epoch(3), FAST, true, seconds(20.0), |_| Some(FAST)), Some(0..1));
+    check(&board);
+    assert_eq!(board.complete(0, seconds(21.0)).map(|holders| holders.len()), Some(3));
+    check(&board);
 }

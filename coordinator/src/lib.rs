@@ -5,6 +5,7 @@ mod convert;
 pub mod farm;
 mod files;
 mod grpc;
+mod http;
 mod hub;
 pub mod ids;
 mod image;

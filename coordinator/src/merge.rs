@@ -30,7 +30,7 @@ pub struct Snapshot {
 }
 
 enum Request {
-    Start(JobId, Arc<JobSpec>),
+    Start(JobId, Arc<JobSpec>, Option<u32>),
     Stored(JobId, u32, StoredResult, Option<Box<UnitResult>>),
     Snapshot(JobId, oneshot::Sender<Snapshot>),
     Nudge(JobId),
@@ -60,9 +60,9 @@ impl MergeQueue {
         (Self { requests }, MergeInbox(inbox))
     }
 
-    /// A job is there: new, or from before a restart.
-    pub fn start(&self, job: JobId, spec: Arc<JobSpec>) {
-        self.send(Request::Start(job, spec));
+    /// A job is there: new, or from before a restart, perhaps with a checkpoint.
+    pub fn start(&self, job: JobId, spec: Arc<JobSpec>, checkpoint: Option<u32>) {
+        self.send(Request::Start(job, spec, checkpoint));
     }
 
     /// A result is stored; `decoded` saves reading it again.
@@ -126,10 +126,7 @@ impl Merge {
 
     fn handle(&mut self, hub: &Arc<Hub>, request: Request) {
         match request {
-            Request::Start(id, spec) => {
-                self.jobs.insert(id, Merging::new(id, spec));
-                self.begin_pass(hub, id);
-            }
+            Request::Start(id, spec, checkpoint) => self.start(hub, id, spec, checkpoint),
             Request::Stored(id, pass, at, decoded) => {
                 if let Some(m) = self.jobs.get_mut(&id) {
                     m.stored(pass, at, decoded);
@@ -153,6 +150,20 @@ impl Merge {
         }
     }
 
+    fn start(&mut self, hub: &Arc<Hub>, id: JobId, spec: Arc<JobSpec>, checkpoint: Option<u32>) {
+        let merging = match checkpoint {
+            Some(number) => Merging::restore(id, spec, &hub.store, number),
+            None => Ok(Merging::new(id, spec)),
+        };
+        match merging {
+            Ok(merging) => {
+                self.jobs.insert(id, merging);
+                self.begin_pass(hub, id);
+            }
+            Err(e) => hub.pause_for(id, &e),
+        }
+    }
+
     /// Folds some units of a job; at the end of a pass goes on to the next.
     fn turn(&mut self, hub: &Arc<Hub>, id: JobId) {
         let Some(m) = self.jobs.get_mut(&id) else { return };
@@ -171,7 +182,11 @@ impl Merge {
                 }
             }
         }
-        if let Some(m) = self.jobs.get(&id) {
+        if let Some(m) = self.jobs.get_mut(&id) {
+            if let Err(e) = m.save_if_due(&hub.store, hub.checkpoint_bytes) {
+                m.stuck = true;
+                hub.pause_for(id, &e);
+            }
             hub.with(|farm, now| farm.note_progress(id, m.progress(), now));
         }
     }

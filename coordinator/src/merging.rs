@@ -3,7 +3,7 @@
 use crate::ids::JobId;
 use crate::job::{JobSpec, Progress};
 use crate::merge::Snapshot;
-use crate::store::{SegmentReader, Store, StoreError, StoredResult};
+use crate::store::{Change, SegmentReader, Store, StoreError, StoredResult, wait};
 use crate::units::UnitSet;
 use renderer::job::{Merger, PassPlan, UnitResult};
 use std::collections::BTreeMap;
@@ -35,7 +35,11 @@ pub struct Merging {
     merger: Merger,
     waiting: BTreeMap<u32, StoredResult>,
     decoded: BTreeMap<u32, Box<UnitResult>>,
-    segment: Option<SegmentReader>,
+    segment: Option<(u32, SegmentReader)>,
+    /// Bytes folded since the last checkpoint.
+    folded_bytes: u64,
+    /// Number and length of the last checkpoint.
+    checkpoint: Option<(u32, u64)>,
     error: Option<(f64, f64)>,
     error_at: Option<Instant>,
     /// The pass under way was published.
@@ -52,6 +56,18 @@ impl Merging {
     /// Nothing merged yet.
     pub fn new(id: JobId, spec: Arc<JobSpec>) -> Self {
         let merger = Merger::new(spec.settings.clone());
+        Self::of(id, spec, merger, None)
+    }
+
+    /// Goes on from a checkpoint.
+    pub fn restore(id: JobId, spec: Arc<JobSpec>, store: &Store, number: u32) -> Result<Self, StoreError> {
+        let state = store.read_checkpoint(id, number)?;
+        let damaged = || StoreError::Fault(format!("checkpoint {number} of job {id} is damaged or of another version"));
+        let merger = Merger::load(&state).filter(|m| *m.settings() == spec.settings).ok_or_else(damaged)?;
+        Ok(Self::of(id, spec, merger, Some((number, state.len() as u64))))
+    }
+
+    fn of(id: JobId, spec: Arc<JobSpec>, merger: Merger, checkpoint: Option<(u32, u64)>) -> Self {
         Self {
             id,
             spec,
@@ -59,6 +75,8 @@ impl Merging {
             waiting: BTreeMap::new(),
             decoded: BTreeMap::new(),
             segment: None,
+            folded_bytes: 0,
+            checkpoint,
             error: None,
             error_at: None,
             begun: false,
@@ -90,8 +108,13 @@ impl Merging {
         self.decoded.clear();
         let stored = store.results(self.id, self.pass())?;
         let count = self.plan().unit_count();
-        self.waiting = stored.into_iter().filter(|r| r.unit < count).map(|r| (r.unit, r)).collect();
-        Ok(self.waiting.keys().copied().collect())
+        let next = self.merger.next_unit();
+        self.waiting = stored.into_iter().filter(|r| (next..count).contains(&r.unit)).map(|r| (r.unit, r)).collect();
+        let mut done = UnitSet::from_range(0..next);
+        for unit in self.waiting.keys() {
+            done.insert(*unit);
+        }
+        Ok(done)
     }
 
     /// A result is stored.
@@ -120,6 +143,7 @@ impl Merging {
         };
         let folded = result.and_then(|r| self.merger.fold(unit, &r).map_err(|e| StoreError::Fault(e.to_string())));
         self.waiting.remove(&unit);
+        self.folded_bytes += at.len;
         match folded {
             Ok(()) if self.merger.pass_complete() => Step::PassComplete,
             Ok(()) => Step::Folded,
@@ -129,15 +153,29 @@ impl Merging {
 
     fn read(&mut self, store: &Store, at: &StoredResult) -> Result<UnitResult, StoreError> {
         let segment = match self.segment.take() {
-            Some(segment) => segment,
-            None => store.segment(self.id, self.pass())?,
+            Some((number, segment)) if number == at.segment => segment,
+            _ => store.segment(self.id, at.segment)?,
         };
         let bytes = segment.read(at)?;
-        self.segment = Some(segment);
+        self.segment = Some((at.segment, segment));
         let s = &self.spec.settings;
         let unit = self.plan().unit(at.unit).ok_or_else(|| StoreError::Fault("no such unit".into()))?;
         UnitResult::decode(&bytes, &unit, s.width, s.height, self.spec.lights as usize)
             .map_err(|e| StoreError::Fault(e.to_string()))
+    }
+
+    /// Saves the merge when so much was folded that its results are worth freeing: `bound` bytes, and twice what a save takes.
+    pub fn save_if_due(&mut self, store: &Store, bound: u64) -> Result<(), StoreError> {
+        if self.folded_bytes < bound.max(2 * self.checkpoint.map_or(0, |c| c.1)) {
+            return Ok(());
+        }
+        let (state, number) = (self.merger.save(), self.checkpoint.map_or(0, |c| c.0 + 1));
+        store.write_checkpoint(self.id, number, &state)?;
+        wait(store.change(Change::Checkpoint(self.id, number, self.pass(), self.merger.next_unit())))?;
+        tracing::debug!(job = %self.id, number, bytes = state.len(), "checkpoint");
+        self.checkpoint = Some((number, state.len() as u64));
+        self.folded_bytes = 0;
+        Ok(())
     }
 
     /// Plans the next pass; `false` when the job is complete.

@@ -65,6 +65,8 @@ impl Farm {
         let average = |old: Option<f64>| Some(old.map_or(seconds, |o| o + NEWEST * (seconds - o)));
         job.unit_seconds = average(job.unit_seconds);
         job.served += seconds;
+        self.totals.accepted += 1;
+        self.totals.seconds += seconds;
         for (epoch, worker) in holders {
             let Some(w) = self.workers.get_mut(&worker) else { continue };
             if p.board.lease(epoch).is_none() {
@@ -117,6 +119,7 @@ impl Farm {
     fn count_failure(&mut self, job: JobId, by: WorkerId, message: &str, retry_at: Duration) {
         let Some(w) = self.workers.get_mut(&by) else { return };
         w.failures += 1;
+        self.totals.failures += 1;
         let with = w.jobs.entry(job).or_default();
         with.fail(message, retry_at);
         if with.blocked.is_some() {

@@ -31,13 +31,16 @@ pub struct Config {
     pub tuning: Tuning,
     /// What workers must have in common with this coordinator.
     pub fingerprint: String,
+    /// The merge of a job is saved, and the results in it freed, when these are so many bytes.
+    pub checkpoint_bytes: u64,
 }
 
 impl Config {
     /// With the usual tuning, for workers of this build.
     pub fn new(listen: SocketAddr, data: PathBuf) -> Self {
         let fingerprint = renderer::FINGERPRINT.to_string();
-        Self { listen, data, http: None, token: None, tuning: Tuning::default(), fingerprint }
+        let tuning = Tuning::default();
+        Self { listen, data, http: None, token: None, tuning, fingerprint, checkpoint_bytes: 256 << 20 }
     }
 }
 
@@ -85,20 +88,19 @@ impl Coordinator {
             None => None,
         };
         let (queue, inbox) = MergeQueue::new();
-        let print = config.fingerprint.clone();
-        let hub = Arc::new(Hub::new(restored.generation, store, blobs, queue, config.tuning, print));
+        let hub = Arc::new(Hub::new(config, restored.generation, store, blobs, queue));
         inbox.start(&hub).map_err(|e| ServeError::Run(e.to_string()))?;
         for stored in restored.jobs {
             let mut job = Farm::new_job(stored.id, stored.spec, stored.state);
             job.message = stored.message;
             job.progress = stored.progress;
             job.clock = ActiveClock::from_total(stored.elapsed);
-            let (id, spec) = (job.id, job.spec.clone());
+            let (id, spec, checkpoint) = (job.id, job.spec.clone(), stored.checkpoint);
             let ended = job.state.ended();
             hub.with(|farm, _| farm.add_job(job));
             if !ended {
                 tracing::info!(job = %id, name = spec.name, "taken up again");
-                hub.merge.start(id, spec);
+                hub.merge.start(id, spec, checkpoint);
             }
         }
         let token = config.token.as_deref().filter(|t| !t.is_empty()).map(Token::new);
@@ -128,9 +130,17 @@ impl Coordinator {
             .add_routes(grpc::routes(&self.hub, &guard))
             .serve_with_incoming(TcpIncoming::from(self.listener).with_nodelay(Some(true)));
         let time = self.hub.keep_time();
+        let router = crate::http::router(&self.hub, self.token);
+        let http = async {
+            match self.http {
+                Some(listener) => axum::serve(listener, router).await,
+                None => std::future::pending().await,
+            }
+        };
         // What is confirmed is durable, so there is nothing to wind down: waiting calls are cut, and their callers call again.
         tokio::select! {
             served = server => served.map_err(|e| ServeError::Run(e.to_string())),
+            served = http => served.map_err(|e| ServeError::Run(e.to_string())),
             () = time => Ok(()),
             () = end => Ok(()),
         }

@@ -75,7 +75,7 @@ pub async fn submit(hub: &Arc<Hub>, r: proto::SubmitRequest) -> Result<bool, Sta
     let spec = job.spec.clone();
     tracing::info!(job = %id, name = spec.name, priority = spec.priority, "submitted");
     hub.with(|farm, _| farm.add_job(job));
-    hub.merge.start(id, spec);
+    hub.merge.start(id, spec, None);
     Ok(false)
 }
 

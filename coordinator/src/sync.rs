@@ -243,6 +243,7 @@ impl Farm {
         let w = self.workers.get_mut(&id)?;
         w.leases.insert(epoch, job_id);
         w.last_job = Some(job_id);
+        self.totals.leases += 1;
         Some(grant)
     }
 

@@ -16,8 +16,8 @@ impl Token {
     }
 
     /// Whether a guess is right. (`blake3::Hash` compares in constant time.)
-    pub fn admits(&self, guess: &str) -> bool {
-        self.0 == blake3::hash(guess.as_bytes())
+    pub fn admits(&self, guess: &[u8]) -> bool {
+        self.0 == blake3::hash(guess)
     }
 }
 
@@ -45,7 +45,7 @@ impl Interceptor for Guard {
         let header = |key: &str| request.metadata().get(key).and_then(|v| v.to_str().ok());
         if let Some(token) = &self.token {
             let given = header("authorization").and_then(|v| v.strip_prefix("Bearer "));
-            if !given.is_some_and(|g| token.admits(g)) {
+            if !given.is_some_and(|g| token.admits(g.as_bytes())) {
                 return Err(Status::unauthenticated(match given {
                     None => "this coordinator asks for a token: give --token or set LIGHTFARM_TOKEN",
                     Some(_) => "the token is not that of this coordinator",

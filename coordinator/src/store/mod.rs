@@ -4,7 +4,7 @@ mod schema;
 mod segment;
 mod writer;
 
-pub use schema::{Restored, StoredResult};
+pub use schema::{Restored, StoredJob, StoredResult};
 pub use segment::SegmentReader;
 
 use crate::ids::{JobId, WorkerId};
@@ -60,7 +60,7 @@ impl From<rusqlite::Error> for StoreError {
 /// What became of a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Appended {
-    /// It is on disk, at this place of the pass's segment.
+    /// It is on disk, at this place.
     New(StoredResult),
     /// One of this digest was there before.
     Existing(Digest),
@@ -103,6 +103,8 @@ pub enum Change {
     },
     /// The time for which a job was active.
     Elapsed(JobId, Duration),
+    /// The merge was saved under this number when it had folded all before unit `.2` of pass `.1`: what is folded is not needed any more.
+    Checkpoint(JobId, u32, u32, u32),
     /// Stored results that can't be read.
     Forget(JobId, u32, Vec<u32>),
     /// A pass is merged, and what was decided then: whether the time was up.
@@ -186,15 +188,26 @@ impl Store {
         schema::pass_end(&schema::open_reader(&self.folder)?, job, pass)
     }
 
-    /// The results of a pass, to read.
-    pub fn segment(&self, job: JobId, pass: u32) -> Result<SegmentReader, StoreError> {
-        SegmentReader::open(&segment::path(&self.folder, job, pass))
+    /// A segment of a job, to read.
+    pub fn segment(&self, job: JobId, number: u32) -> Result<SegmentReader, StoreError> {
+        SegmentReader::open(&segment::path(&self.folder, job, number))
     }
 
-    /// Bytes of a job's stored results.
+    /// Bytes of a job's files.
     pub fn stored_bytes(&self, job: JobId) -> u64 {
         let files = std::fs::read_dir(segment::folder(&self.folder, job)).into_iter().flatten().flatten();
         files.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum()
+    }
+
+    /// Stores the state of a job's merge; it counts with [`Change::Checkpoint`].
+    pub fn write_checkpoint(&self, job: JobId, number: u32, state: &[u8]) -> Result<(), StoreError> {
+        Ok(crate::files::write_durably(&checkpoint_path(&self.folder, job, number), state)?)
+    }
+
+    /// The state of a job's merge.
+    pub fn read_checkpoint(&self, job: JobId, number: u32) -> Result<Vec<u8>, StoreError> {
+        let path = checkpoint_path(&self.folder, job, number);
+        std::fs::read(&path).map_err(|e| StoreError::Fault(format!("{}: {e}", path.display())))
     }
 
     /// Where a job's image is, or will be.
@@ -209,6 +222,11 @@ impl Store {
         crate::files::write_durably(&path, exr)?;
         Ok(())
     }
+}
+
+/// A saved merge.
+fn checkpoint_path(data: &Path, job: JobId, number: u32) -> PathBuf {
+    segment::folder(data, job).join(format!("{number}.merge"))
 }
 
 /// Waits, on a thread of its own, for a receipt.

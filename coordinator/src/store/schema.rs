@@ -29,7 +29,8 @@ CREATE TABLE jobs (
     state TEXT NOT NULL,
     message TEXT NOT NULL,
     elapsed_ms INTEGER NOT NULL,
-    progress TEXT NOT NULL
+    progress TEXT NOT NULL,
+    checkpoint INTEGER
 );
 CREATE TABLE passes (
     job BLOB NOT NULL, pass INTEGER NOT NULL, time_up INTEGER NOT NULL,
@@ -37,16 +38,18 @@ CREATE TABLE passes (
 ) WITHOUT ROWID;
 CREATE TABLE results (
     job BLOB NOT NULL, pass INTEGER NOT NULL, unit INTEGER NOT NULL,
-    place INTEGER NOT NULL, len INTEGER NOT NULL, digest BLOB NOT NULL, worker BLOB NOT NULL,
+    segment INTEGER NOT NULL, place INTEGER NOT NULL, len INTEGER NOT NULL, digest BLOB NOT NULL, worker BLOB NOT NULL,
     PRIMARY KEY (job, pass, unit)
 ) WITHOUT ROWID;
 ";
 
-/// Where a result lies in its pass's segment.
+/// Where a result lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoredResult {
     /// The unit.
     pub unit: u32,
+    /// The job's segment.
+    pub segment: u32,
     /// First byte.
     pub place: u64,
     /// Number of bytes.
@@ -70,6 +73,8 @@ pub struct StoredJob {
     pub elapsed: Duration,
     /// What was merged when it ended.
     pub progress: Progress,
+    /// The latest checkpoint of its merge.
+    pub checkpoint: Option<u32>,
 }
 
 /// What the folder holds.
@@ -122,7 +127,7 @@ pub fn restore(db: &mut Connection) -> Result<Restored, StoreError> {
     {
         let mut all = tx.prepare(
             "SELECT id, name, priority, manifest, scene, settings, lights, payload, submitted_ms, state, message, \
-             elapsed_ms, progress FROM jobs ORDER BY number",
+             elapsed_ms, progress, checkpoint FROM jobs ORDER BY number",
         )?;
         let mut rows = all.query([])?;
         while let Some(row) = rows.next()? {
@@ -159,19 +164,21 @@ fn job_of(row: &Row<'_>) -> Result<StoredJob, StoreError> {
         message: row.get(10)?,
         elapsed: Duration::from_millis(elapsed as u64),
         progress: progress_from_json(&progress),
+        checkpoint: row.get(13)?,
     })
 }
 
 /// The stored results of a pass, in the order of the units.
 pub fn results(db: &Connection, job: JobId, pass: u32) -> Result<Vec<StoredResult>, StoreError> {
     let mut all =
-        db.prepare("SELECT unit, place, len, digest FROM results WHERE job = ?1 AND pass = ?2 ORDER BY unit")?;
+        db.prepare("SELECT unit, segment, place, len, digest FROM results WHERE job = ?1 AND pass = ?2 ORDER BY unit")?;
     let rows = all.query_map(params![job.0.as_bytes(), pass], |r| {
         Ok(StoredResult {
             unit: r.get(0)?,
-            place: r.get::<_, i64>(1)? as u64,
-            len: r.get::<_, i64>(2)? as u64,
-            digest: Digest(r.get(3)?),
+            segment: r.get(1)?,
+            place: r.get::<_, i64>(2)? as u64,
+            len: r.get::<_, i64>(3)? as u64,
+            digest: Digest(r.get(4)?),
         })
     })?;
     Ok(rows.collect::<Result<_, _>>()?)

@@ -1,4 +1,4 @@
-//! The results of one pass, one after the other in a file. What the database does not list does not count.
+//! Results, one after the other in files. What the database does not list does not count.
 
 use super::{StoreError, StoredResult};
 use crate::ids::JobId;
@@ -12,9 +12,15 @@ pub fn folder(data: &Path, job: JobId) -> PathBuf {
     data.join("jobs").join(job.to_string())
 }
 
-/// The segment of a pass.
-pub fn path(data: &Path, job: JobId, pass: u32) -> PathBuf {
-    folder(data, job).join(format!("pass-{pass}.results"))
+/// A segment of a job: results are appended to one until it is full, then to the next.
+pub fn path(data: &Path, job: JobId, number: u32) -> PathBuf {
+    folder(data, job).join(format!("{number}.results"))
+}
+
+/// The numbers of a job's segments, in no order.
+pub fn numbers(data: &Path, job: JobId) -> Vec<u32> {
+    let files = std::fs::read_dir(folder(data, job)).into_iter().flatten().flatten();
+    files.filter_map(|f| f.file_name().to_str()?.strip_suffix(".results")?.parse().ok()).collect()
 }
 
 /// A segment that grows.
@@ -28,9 +34,9 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Opens or makes the segment, cut to the bytes that the database lists: a crash may have left more.
-    pub fn open(data: &Path, job: JobId, pass: u32, committed: u64) -> Result<Self, StoreError> {
-        let path = path(data, job, pass);
+    /// Opens or makes a segment, cut to the bytes that the database lists: a crash may have left more.
+    pub fn open(data: &Path, job: JobId, number: u32, committed: u64) -> Result<Self, StoreError> {
+        let path = path(data, job, number);
         let folder = folder(data, job);
         if !folder.exists() {
             std::fs::create_dir_all(&folder)?;
@@ -44,6 +50,11 @@ impl Segment {
             crate::files::sync_folder(&folder)?;
         }
         Ok(Self { file, committed, end: committed })
+    }
+
+    /// Bytes written.
+    pub fn len(&self) -> u64 {
+        self.end
     }
 
     /// Writes bytes at the end and says where they begin.

@@ -99,7 +99,7 @@ fn bytes_of_an_interrupted_append_are_cut_off() {
     add(&store, id(1));
     wait(store.append(result(id(1), 0, 0, "first"))).unwrap();
     drop(guard);
-    let path = folder.path().join("jobs").join(id(1).to_string()).join("pass-0.results");
+    let path = folder.path().join("jobs").join(id(1).to_string()).join("0.results");
     let mut bytes = std::fs::read(&path).unwrap();
     bytes.extend(b"torn");
     std::fs::write(&path, &bytes).unwrap();
@@ -115,7 +115,7 @@ fn a_damaged_result_is_found_out_and_can_be_forgotten() {
     let (store, _guard, _) = Store::open(folder.path()).unwrap();
     add(&store, id(1));
     wait(store.append(result(id(1), 0, 0, "first"))).unwrap();
-    let path = folder.path().join("jobs").join(id(1).to_string()).join("pass-0.results");
+    let path = folder.path().join("jobs").join(id(1).to_string()).join("0.results");
     std::fs::write(&path, "fIrst").unwrap();
     let at = store.results(id(1), 0).unwrap()[0];
     assert!(store.segment(id(1), 0).unwrap().read(&at).is_err());
@@ -142,4 +142,39 @@ fn an_ended_job_keeps_its_image_and_takes_no_results() {
     assert_eq!(wait(store.append(result(id(1), 0, 1, "late"))), Err(StoreError::Ended));
     assert_eq!(store.stored_bytes(id(1)), 5);
     assert_eq!(std::fs::read(store.image_path(id(1))).unwrap(), b"image");
+}
+
+#[test]
+fn a_checkpoint_frees_what_is_folded_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (store, guard, _) = Store::open(folder.path()).unwrap();
+    add(&store, id(1));
+    let large = "x".repeat(40 << 20);
+    for unit in 0..5 {
+        wait(store.append(result(id(1), 0, unit, &format!("{unit}{large}")))).unwrap();
+    }
+    wait(store.change(Change::PassEnd(id(1), 0, false))).unwrap();
+    wait(store.append(result(id(1), 1, 0, "next pass"))).unwrap();
+    wait(store.append(result(id(1), 1, 3, "further on"))).unwrap();
+    let before = store.stored_bytes(id(1));
+    store.write_checkpoint(id(1), 1, b"state").unwrap();
+    wait(store.change(Change::Checkpoint(id(1), 1, 1, 1))).unwrap();
+    store.write_checkpoint(id(1), 2, b"newer").unwrap();
+    wait(store.change(Change::Checkpoint(id(1), 2, 1, 1))).unwrap();
+    let after = store.stored_bytes(id(1));
+    assert!(before > 200 << 20 && after < 81 << 20, "{before} bytes, then {after}");
+    assert!(store.read_checkpoint(id(1), 1).is_err());
+    drop(guard);
+
+    let (store, _guard, restored) = Store::open(folder.path()).unwrap();
+    assert_eq!(restored.jobs[0].checkpoint, Some(2));
+    assert_eq!(store.read_checkpoint(id(1), 2).unwrap(), b"newer");
+    let left = store.results(id(1), 1).unwrap();
+    assert_eq!(left.iter().map(|r| r.unit).collect::<Vec<_>>(), [3]);
+    assert_eq!(store.segment(id(1), left[0].segment).unwrap().read(&left[0]).unwrap(), b"further on");
+    assert!(store.results(id(1), 0).unwrap().is_empty());
+    wait(store.append(result(id(1), 1, 4, "after the restart"))).unwrap();
+    let left = store.results(id(1), 1).unwrap();
+    assert_eq!(store.segment(id(1), left[1].segment).unwrap().read(&left[1]).unwrap(), b"after the restart");
+    assert_eq!(store.segment(id(1), left[0].segment).unwrap().read(&left[0]).unwrap(), b"further on");
 }

@@ -16,14 +16,21 @@ use tokio::sync::oneshot;
 /// Requests, and bytes of results, that go into one transaction at most.
 const BATCH: usize = 512;
 const BATCH_BYTES: usize = 64 << 20;
+/// A segment of this length gets no more results: checkpoints free whole segments.
+const FULL_SEGMENT: u64 = 64 << 20;
 
 type Reply<T> = oneshot::Sender<Result<T, StoreError>>;
 
 pub struct Writer {
     db: Connection,
-    folder: PathBuf,
-    segments: BTreeMap<(JobId, u32), Segment>,
+    segments: Segments,
     ended: BTreeSet<JobId>,
+}
+
+/// The segments that results are appended to.
+struct Segments {
+    folder: PathBuf,
+    open: BTreeMap<(JobId, u32), Segment>,
 }
 
 /// Answers that wait for the transaction.
@@ -33,17 +40,18 @@ struct Answers {
     changed: Vec<Reply<()>>,
     touched: BTreeSet<(JobId, u32)>,
     ended: Vec<JobId>,
+    checkpoints: Vec<(JobId, u32)>,
 }
 
 impl Writer {
     pub fn new(db: Connection, folder: PathBuf, restored: &Restored) -> Self {
         let ended = restored.jobs.iter().filter(|j| j.state.ended()).map(|j| j.id).collect();
-        Self { db, folder, segments: BTreeMap::new(), ended }
+        Self { db, segments: Segments { folder, open: BTreeMap::new() }, ended }
     }
 
     pub fn run(mut self, inbox: &Receiver<Request>) {
         // What an interrupted ending left behind.
-        self.ended.iter().for_each(|job| remove_results(&self.folder, *job));
+        self.ended.iter().for_each(|job| remove_files(&self.segments.folder, *job, |_| true));
         while let Ok(first) = inbox.recv() {
             let (mut batch, mut bytes, mut open) = (Vec::new(), 0, true);
             let mut next = Some(first);
@@ -72,7 +80,7 @@ impl Writer {
         let mut answers = Answers::default();
         let outcome = self.transact(batch, &mut answers);
         for key in &answers.touched {
-            if let Some(segment) = self.segments.get_mut(key) {
+            if let Some(segment) = self.segments.open.get_mut(key) {
                 if outcome.is_ok() { segment.commit() } else { segment.roll_back() }
             }
         }
@@ -80,8 +88,11 @@ impl Writer {
             Ok(()) => {
                 for job in answers.ended {
                     self.ended.insert(job);
-                    self.segments.retain(|(j, _), _| *j != job);
-                    remove_results(&self.folder, job);
+                    self.segments.open.retain(|(j, _), _| *j != job);
+                    remove_files(&self.segments.folder, job, |_| true);
+                }
+                for (job, checkpoint) in answers.checkpoints {
+                    self.free(job, checkpoint);
                 }
                 answers.appended.into_iter().for_each(|(a, reply)| drop(reply.send(Ok(a))));
                 answers.changed.into_iter().for_each(|reply| drop(reply.send(Ok(()))));
@@ -92,6 +103,21 @@ impl Writer {
                 answers.changed.into_iter().for_each(|reply| drop(reply.send(Err(e.clone()))));
             }
         }
+    }
+
+    /// Removes what a checkpoint has made useless: earlier ones, and segments of which no result is listed.
+    fn free(&mut self, job: JobId, checkpoint: u32) {
+        let first = "SELECT min(segment) FROM results WHERE job = ?1";
+        let Ok(first) = self.db.query_row(first, params![job.0.as_bytes()], |r| r.get::<_, Option<u32>>(0)) else {
+            return;
+        };
+        let newest = self.segments.open.keys().filter(|(j, _)| *j == job).map(|(_, n)| *n).max();
+        let keep = first.into_iter().chain(newest).min().unwrap_or(u32::MAX);
+        self.segments.open.retain(|(j, n), _| *j != job || *n >= keep);
+        remove_files(&self.segments.folder, job, |file| match file {
+            JobFile::Segment(n) => n < keep,
+            JobFile::Checkpoint(n) => n != checkpoint,
+        });
     }
 
     /// All of a batch or nothing. Requests that fail by themselves are answered at once.
@@ -109,9 +135,11 @@ impl Writer {
             let done = match request {
                 Request::Append(result, reply) => {
                     let ended = self.ended.contains(&result.job) || answers.ended.contains(&result.job);
-                    match append(&tx, &self.folder, &mut self.segments, ended, &result) {
-                        Ok((appended, touched)) => {
-                            answers.touched.extend(touched);
+                    match self.segments.append(&tx, ended, &result) {
+                        Ok(appended) => {
+                            if let Appended::New(at) = appended {
+                                answers.touched.insert((result.job, at.segment));
+                            }
                             answers.appended.push((appended, reply));
                             Ok(())
                         }
@@ -120,7 +148,8 @@ impl Writer {
                             Ok(())
                         }
                         Err(e) => {
-                            answers.touched.insert((result.job, result.pass));
+                            // What was written of it has to be cut off.
+                            answers.touched.extend(self.segments.current(result.job).map(|n| (result.job, n)));
                             answers.appended.push((Appended::Existing(result.digest), reply));
                             Err(e)
                         }
@@ -137,6 +166,9 @@ impl Writer {
                     {
                         answers.ended.push(*job);
                     }
+                    if let Change::Checkpoint(job, number, ..) = &change {
+                        answers.checkpoints.push((*job, *number));
+                    }
                     apply(&tx, &change)
                 }
                 Request::Close => Ok(()),
@@ -149,7 +181,7 @@ impl Writer {
         batch.for_each(|r| answers.postpone(r));
         outcome?;
         for key in &answers.touched {
-            if let Some(segment) = self.segments.get(key) {
+            if let Some(segment) = self.segments.open.get(key) {
                 segment.sync()?;
             }
         }
@@ -170,43 +202,52 @@ impl Answers {
     }
 }
 
-fn append(
-    tx: &Transaction<'_>,
-    data: &Path,
-    segments: &mut BTreeMap<(JobId, u32), Segment>,
-    ended: bool,
-    r: &NewResult,
-) -> Result<(Appended, Option<(JobId, u32)>), StoreError> {
-    if ended {
-        return Err(StoreError::Ended);
+impl Segments {
+    /// The segment to which a job's results go now.
+    fn current(&self, job: JobId) -> Option<u32> {
+        self.open.range((job, 0)..=(job, u32::MAX)).next_back().map(|((_, n), _)| *n)
     }
-    if let Some(digest) = find(tx, r.job, r.pass, r.unit)? {
-        return Ok((Appended::Existing(digest), None));
+
+    /// Writes a result, unless its unit has one.
+    fn append(&mut self, tx: &Transaction<'_>, ended: bool, r: &NewResult) -> Result<Appended, StoreError> {
+        if ended {
+            return Err(StoreError::Ended);
+        }
+        if let Some(digest) = find(tx, r.job, r.pass, r.unit)? {
+            return Ok(Appended::Existing(digest));
+        }
+        let number = self.writable(tx, r.job)?;
+        let Some(segment) = self.open.get_mut(&(r.job, number)) else { return Err(StoreError::Ended) };
+        let place = segment.append(&r.bytes)?;
+        let len = r.bytes.len() as u64;
+        tx.prepare_cached("INSERT INTO results VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)")?.execute(params![
+            r.job.0.as_bytes(),
+            r.pass,
+            r.unit,
+            number,
+            place as i64,
+            len as i64,
+            r.digest.0,
+            r.worker.0.as_bytes()
+        ])?;
+        Ok(Appended::New(StoredResult { unit: r.unit, segment: number, place, len, digest: r.digest }))
     }
-    let key = (r.job, r.pass);
-    if !segments.contains_key(&key) {
+
+    /// A segment with room; after a start, the last one of the job, cut to what is listed.
+    fn writable(&mut self, tx: &Transaction<'_>, job: JobId) -> Result<u32, StoreError> {
+        let number = match self.current(job) {
+            Some(n) if self.open.get(&(job, n)).is_some_and(|s| s.len() < FULL_SEGMENT) => return Ok(n),
+            Some(n) => n + 1,
+            None => super::segment::numbers(&self.folder, job).into_iter().max().unwrap_or(0),
+        };
         let committed: i64 = tx.query_row(
-            "SELECT coalesce(max(place + len), 0) FROM results WHERE job = ?1 AND pass = ?2",
-            params![r.job.0.as_bytes(), r.pass],
+            "SELECT coalesce(max(place + len), 0) FROM results WHERE job = ?1 AND segment = ?2",
+            params![job.0.as_bytes(), number],
             |row| row.get(0),
         )?;
-        // Earlier passes of the job get no more results.
-        segments.retain(|(j, p), _| *j != r.job || *p >= r.pass);
-        segments.insert(key, Segment::open(data, r.job, r.pass, committed as u64)?);
+        self.open.insert((job, number), Segment::open(&self.folder, job, number, committed as u64)?);
+        Ok(number)
     }
-    let Some(segment) = segments.get_mut(&key) else { return Err(StoreError::Ended) };
-    let place = segment.append(&r.bytes)?;
-    let len = r.bytes.len() as u64;
-    tx.prepare_cached("INSERT INTO results VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")?.execute(params![
-        r.job.0.as_bytes(),
-        r.pass,
-        r.unit,
-        place as i64,
-        len as i64,
-        r.digest.0,
-        r.worker.0.as_bytes()
-    ])?;
-    Ok((Appended::New(StoredResult { unit: r.unit, place, len, digest: r.digest }), Some(key)))
 }
 
 fn find(tx: &Transaction<'_>, job: JobId, pass: u32, unit: u32) -> Result<Option<Digest>, StoreError> {
@@ -254,6 +295,13 @@ fn apply(tx: &Transaction<'_>, change: &Change) -> Result<(), StoreError> {
             let ms = elapsed.as_millis() as i64;
             tx.execute("UPDATE jobs SET elapsed_ms = ?2 WHERE id = ?1", params![job.0.as_bytes(), ms])?;
         }
+        Change::Checkpoint(job, number, pass, next) => {
+            let id = job.0.as_bytes();
+            tx.execute("UPDATE jobs SET checkpoint = ?2 WHERE id = ?1", params![id, number])?;
+            let folded = "DELETE FROM results WHERE job = ?1 AND (pass < ?2 OR (pass = ?2 AND unit < ?3))";
+            tx.execute(folded, params![id, pass, next])?;
+            tx.execute("DELETE FROM passes WHERE job = ?1 AND pass < ?2", params![id, pass])?;
+        }
         Change::Forget(job, pass, units) => {
             let mut delete = tx.prepare_cached("DELETE FROM results WHERE job = ?1 AND pass = ?2 AND unit = ?3")?;
             for unit in units {
@@ -267,10 +315,19 @@ fn apply(tx: &Transaction<'_>, change: &Change) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Results of a job that has ended are of no use.
-fn remove_results(data: &Path, job: JobId) {
+/// A file that serves an unfinished job.
+enum JobFile {
+    Segment(u32),
+    Checkpoint(u32),
+}
+
+/// Removes files of a job; its image stays in any case.
+fn remove_files(data: &Path, job: JobId, which: impl Fn(JobFile) -> bool) {
     for file in std::fs::read_dir(folder(data, job)).into_iter().flatten().flatten() {
-        if file.path().extension().is_some_and(|e| e == "results")
+        let name = file.file_name();
+        let number = |suffix: &str| name.to_str()?.strip_suffix(suffix)?.parse().ok();
+        let kind = number(".results").map(JobFile::Segment).or(number(".merge").map(JobFile::Checkpoint));
+        if kind.is_some_and(&which)
             && let Err(e) = std::fs::remove_file(file.path())
         {
             tracing::warn!("{} can't be removed: {e}", file.path().display());
