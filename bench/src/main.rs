@@ -1,2 +1,59 @@
-//! Placeholder.
-fn main() {}
+//! Figures: rays per second, samples per second, what the farm costs. See `README.md` beside this crate.
+
+mod farm;
+mod meshes;
+mod rays;
+mod samples;
+
+use clap::{Parser, Subcommand};
+use serde::Serialize;
+use std::process::ExitCode;
+
+#[derive(Debug, Parser)]
+#[command(name = "bench", about = "Measures lightfarm")]
+struct Cli {
+    /// One JSON document on standard output instead of a table.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Rays per second of the acceleration structure, on one thread.
+    Rays(rays::Args),
+    /// Samples per second of whole renders.
+    Samples(samples::Args),
+    /// Two one-thread workers against one two-thread render.
+    Farm(farm::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match &cli.what {
+        What::Rays(args) => rays::run(args).map(|r| show(cli.json, &r, rays::table)),
+        What::Samples(args) => samples::run(args).map(|r| show(cli.json, &r, |r| samples::table(r))),
+        What::Farm(args) => farm::run(args).map(|r| show(cli.json, &r, ToString::to_string)),
+    };
+    match result {
+        Ok(text) => {
+            println!("{text}");
+            ExitCode::SUCCESS
+        }
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The report as a table or as JSON.
+fn show<T: Serialize>(json: bool, report: &T, table: impl Fn(&T) -> String) -> String {
+    if json {
+        // A plain struct of numbers and names always serialises.
+        serde_json::to_string_pretty(report).unwrap_or_default()
+    } else {
+        table(report)
+    }
+}
