@@ -3,8 +3,10 @@
 use crate::exit::Failure;
 use serde::Serialize;
 use std::fmt::Display;
-use std::io::{self, Write};
-use tracing_subscriber::EnvFilter;
+use std::io::{self, IsTerminal, Write};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Where results go, and in which form.
 #[derive(Clone, Copy, Debug)]
@@ -57,8 +59,17 @@ fn put(mut to: impl Write, text: &str) {
     let _ = writeln!(to, "{text}").and_then(|()| to.flush());
 }
 
-/// Logs to standard error; `RUST_LOG` overrides `level`.
+/// Logs to standard error; `RUST_LOG` overrides `level` (`info`, or `warn,coordinator=debug`).
 pub fn start_log(level: &str) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr).init();
+    let wanted = std::env::var("RUST_LOG").ok().filter(|v| !v.is_empty());
+    let parsed: Option<Result<Targets, _>> = wanted.as_ref().map(|v| v.parse());
+    let filter = match &parsed {
+        Some(Ok(targets)) => targets.clone(),
+        _ => Targets::new().with_default(level.parse::<LevelFilter>().unwrap_or(LevelFilter::WARN)),
+    };
+    let lines = tracing_subscriber::fmt::layer().with_writer(io::stderr).with_ansi(io::stderr().is_terminal());
+    tracing_subscriber::registry().with(lines).with(filter).init();
+    if let (Some(text), Some(Err(e))) = (wanted, parsed) {
+        tracing::warn!("RUST_LOG={text:?} is not understood: {e}");
+    }
 }
