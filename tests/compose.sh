@@ -52,7 +52,9 @@ await() {
 
 "${compose[@]}" "${project[@]}" up --build --detach >"$work/up.log" 2>&1 || { cat "$work/up.log"; exit 1; }
 
-two_workers() { [ "$("$lightfarm" workers --json 2>/dev/null | grep -c '"name"')" -ge 2 ]; }
+two_workers() {
+    [ "$("$lightfarm" workers --json 2>/dev/null | grep -o '"state":"[a-z]*"' | grep -vc lost)" -ge 2 ]
+}
 await 60 two_workers
 echo "ok: two workers dialled in, by the coordinator's name"
 
