@@ -81,8 +81,8 @@ for integrator in path light; do
     echo "ok: $integrator: killed a worker at $(grep -Eo '"fraction":0\.[0-9]{0,3}' "$work/show.json" | head -1)"
 
     "$lightfarm" watch "$job" >"$work/watch.log" 2>&1 || { cat "$work/watch.log"; exit 1; }
-    "$lightfarm" fetch "$job" -o "$work/farm.exr"
-    "$lightfarm" render "$scene" "${options[@]}" -o "$work/alone.exr"
+    "$lightfarm" fetch "$job" -o "$work/farm.exr" >"$work/fetch.log"
+    "$lightfarm" render "$scene" "${options[@]}" -o "$work/alone.exr" >"$work/render.log" 2>&1 || { cat "$work/render.log"; exit 1; }
     "$lightfarm" diff "$work/farm.exr" "$work/alone.exr" --bit-exact
     echo "ok: $integrator: the farm's pixels are those of lightfarm render"
 
