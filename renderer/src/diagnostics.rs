@@ -88,10 +88,20 @@ impl fmt::Display for SceneError {
     }
 }
 
+/// Longer names are no slip of the pen, and the distance of two names takes time and memory of their lengths' product.
+const MAX_NAME: usize = 64;
+/// No more names than this are compared.
+const MAX_KNOWN: usize = 1000;
+
 /// The nearest of `known` to `name`, when it is near enough to be a likely slip of the pen.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    if name.len() > MAX_NAME {
+        return None;
+    }
     known
         .into_iter()
+        .take(MAX_KNOWN)
+        .filter(|k| k.len() <= MAX_NAME)
         .map(|k| (strsim::damerau_levenshtein(&name.to_lowercase(), &k.to_lowercase()), k))
         .filter(|(d, k)| *d <= 1 + k.len().max(name.len()) / 3)
         .min()

@@ -58,8 +58,18 @@ pub(super) fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
     if boxes.is_empty() {
         return Vec::new();
     }
-    let nodes = if boxes.len() > 1 { build_by_area(boxes) } else { balanced(boxes) };
+    let nodes = if boxes.len() > 1 && !concentric(boxes) { build_by_area(boxes) } else { balanced(boxes) };
     if depth(&nodes) <= MAX_DEPTH { nodes } else { balanced(boxes) }
+}
+
+/// Most boxes with the very same centre that obvhs is given: it takes time quadratic in their number.
+const MAX_CONCENTRIC: usize = 1024;
+
+/// Whether too many boxes share their centre.
+fn concentric(boxes: &[Box3]) -> bool {
+    let mut centres: Vec<[u32; 3]> = boxes.iter().map(|b| (b.low + b.high).to_array().map(f32::to_bits)).collect();
+    centres.sort_unstable();
+    centres.len() > MAX_CONCENTRIC && centres.windows(MAX_CONCENTRIC + 1).any(|w| w[0] == w[MAX_CONCENTRIC])
 }
 
 /// obvhs's builder at its medium setting: PLOC (Meister and Bittner 2018), then reinsertion (Meister and Bittner 2018 again).

@@ -178,7 +178,7 @@ fn closed_meshes_do_not_leak_at_edges_and_vertices() {
 #[test]
 fn coincident_and_nested_geometry_builds_and_is_hit() {
     // Thousands of the same triangle, and triangles that shrink towards a point: trees degenerate to lists.
-    let same = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 5000];
+    let same = vec![[Vec3::ZERO, Vec3::X, Vec3::Y]; 100_000];
     let mut scale = 1.0f32;
     let nested: Vec<[Vec3; 3]> = (0..2000)
         .map(|_| {

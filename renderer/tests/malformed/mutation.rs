@@ -5,10 +5,12 @@ use crate::whole::{decode, load_scene};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use exr::prelude::{Compression, Encoding, Image, Layer, LayerAttributes, LineOrder, SpecificChannels, WritableImage};
-use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat};
+use image::{DynamicImage, ImageFormat};
 use renderer::scene::bundle::MemorySource;
 use serde_json::{Value, json};
 use std::io::Cursor;
+
+const JPEG: &[u8] = include_bytes!("../data/ramps.jpg");
 
 /// A sequence of numbers without a seed to choose: Weyl's, mixed (SplitMix64).
 struct Numbers(u64);
@@ -78,10 +80,6 @@ fn picture(format: ImageFormat) -> Vec<u8> {
     let pixels: Vec<u8> = (0..16 * 8 * 3).map(|i| (i * 5 % 256) as u8).collect();
     let mut out = Cursor::new(Vec::new());
     match format {
-        ImageFormat::Jpeg => {
-            let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut out, 80);
-            encoder.write_image(&pixels, 16, 8, ExtendedColorType::Rgb8).unwrap();
-        }
         ImageFormat::Hdr => {
             let pixels: Vec<image::Rgb<f32>> = (0..128).map(|i| image::Rgb([i as f32, 0.5, 1e-3])).collect();
             image::codecs::hdr::HdrEncoder::new(&mut out).encode(&pixels, 16, 8).unwrap();
@@ -168,7 +166,7 @@ fn scene_json() -> Value {
             { "extensions": { "KHR_materials_unlit": {} } },
         ],
         "textures": [{ "source": 0, "sampler": 0 }, { "source": 1 }],
-        "images": [{ "uri": uri("image/jpeg", &picture(ImageFormat::Jpeg)) }, { "bufferView": 7, "mimeType": "image/png" }],
+        "images": [{ "uri": uri("image/jpeg", JPEG) }, { "bufferView": 7, "mimeType": "image/png" }],
         "samplers": [{ "magFilter": 9728, "minFilter": 9984, "wrapS": 33071, "wrapT": 33648 }],
         "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.7, "znear": 0.1, "aspectRatio": 1.5 } }],
         "extensions": { "KHR_lights_punctual": { "lights": [
@@ -205,7 +203,7 @@ fn damaged_pictures_decode_or_give_an_error() {
     let _alone = alone();
     let pictures = [
         ("png", picture(ImageFormat::Png)),
-        ("jpeg", picture(ImageFormat::Jpeg)),
+        ("jpeg", JPEG.to_vec()),
         ("hdr", picture(ImageFormat::Hdr)),
         ("exr uncompressed", exr_picture(Compression::Uncompressed)),
         ("exr rle", exr_picture(Compression::RLE)),

@@ -8,6 +8,7 @@ use crate::geometry::{Mesh, MeshId};
 use crate::math::{DAffine3, Transform};
 use crate::scene::bundle::{FileSource, resolve};
 use crate::scene::desc::{SceneDesc, ShapeDesc};
+use crate::spectrum::Rgb;
 use crate::texture::{Image, Texture, TextureId};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -15,6 +16,14 @@ use std::sync::Arc;
 
 /// More diagnostics than this are counted, not kept.
 const MAX_DIAGNOSTICS: usize = 200;
+/// Longer messages are cut: what they quote comes from the file.
+const MAX_MESSAGE: usize = 2000;
+/// Bytes of text that one scene may consist of, over all its files.
+const MAX_TEXT: usize = 32 << 20;
+/// Versions of one mesh file, with normals computed for different scales, that are kept.
+const MAX_VERSIONS: usize = 64;
+/// Characters of an object's name that are kept.
+const MAX_NAME: usize = 60;
 /// Placed objects that one scene may expand to; a group of n shapes instanced m times counts n m.
 const MAX_SHAPES: usize = 1 << 21;
 
@@ -40,10 +49,12 @@ pub(super) struct Importer<'a> {
     unlisted: usize,
     /// What was imported so far.
     pub scene: SceneDesc,
-    images: BTreeMap<(String, ImageKind), Option<Arc<Image>>>,
+    text_left: usize,
+    /// By path, kind, and whether texels were replaced by their luminance.
+    images: BTreeMap<(String, ImageKind, bool), Option<Arc<Image>>>,
     meshes: BTreeMap<MeshKey, Option<MeshId>>,
-    /// Whether a mesh file brings its own normals, known once it was read.
-    file_normals: BTreeMap<String, bool>,
+    /// Whether a mesh file brings its own normals, and how many versions of it there are; known once it was read.
+    mesh_files: BTreeMap<String, (bool, usize)>,
     full: bool,
 }
 
@@ -57,9 +68,10 @@ impl<'a> Importer<'a> {
             order: Vec::new(),
             unlisted: 0,
             scene: SceneDesc::default(),
+            text_left: MAX_TEXT,
             images: BTreeMap::new(),
             meshes: BTreeMap::new(),
-            file_normals: BTreeMap::new(),
+            mesh_files: BTreeMap::new(),
             full: false,
         }
     }
@@ -79,6 +91,14 @@ impl<'a> Importer<'a> {
     /// Reads the text file `path` (already resolved); `from` names the place that asked for it.
     pub fn read_text(&mut self, from: Option<Place>, path: &str) -> Option<(usize, Arc<[u8]>)> {
         let bytes = self.read(from, path)?;
+        let left = self.text_left.checked_sub(bytes.len());
+        let Some(left) = left else {
+            let message = format!("the scene has more than {} MiB of text", MAX_TEXT >> 20);
+            let help = "move meshes to PLY files, pictures to image files";
+            self.report(Severity::Error, ELSEWHERE, path, String::new(), message, help.into());
+            return None;
+        };
+        self.text_left = left;
         if let Err(e) = std::str::from_utf8(&bytes) {
             let place = format!("byte {}", e.valid_up_to());
             let help = "save it in the encoding UTF-8";
@@ -128,7 +148,17 @@ impl<'a> Importer<'a> {
         self.report(Severity::Error, ELSEWHERE, path, place.to_string(), message.to_string(), String::new());
     }
 
+    /// Whether one more diagnostic would only be counted.
+    fn is_list_full(&self, severity: Severity) -> bool {
+        let first_error = severity == Severity::Error && !self.diagnostics.has_errors();
+        self.diagnostics.list.len() >= MAX_DIAGNOSTICS && !first_error
+    }
+
     fn report_at(&mut self, severity: Severity, at: Place, message: String, help: String) {
+        if self.is_list_full(severity) {
+            self.unlisted += 1;
+            return;
+        }
         let (path, text) = &self.texts[at.file];
         let (path, place) = (path.clone(), line_and_column(text, at.offset));
         self.report(severity, (at.file, at.offset), &path, place, message, help);
@@ -143,11 +173,11 @@ impl<'a> Importer<'a> {
         message: String,
         help: String,
     ) {
-        let first_error = severity == Severity::Error && !self.diagnostics.has_errors();
-        if self.diagnostics.list.len() >= MAX_DIAGNOSTICS && !first_error {
+        if self.is_list_full(severity) {
             self.unlisted += 1;
             return;
         }
+        let (message, help) = (shortened(message), shortened(help));
         self.order.push(order);
         match severity {
             Severity::Error => self.diagnostics.error(path, place, message, help),
@@ -155,14 +185,22 @@ impl<'a> Importer<'a> {
         }
     }
 
-    /// The decoded picture `written` at `at`; decoded once however often it is named.
-    pub fn image(&mut self, at: Place, written: &str, kind: ImageKind) -> Option<Arc<Image>> {
-        let path = self.resolve(at, written);
-        let key = (path, kind);
+    /// The decoded picture `written` at `at`, if asked for with its luminance in all channels; decoded once however often it is
+    /// named.
+    pub fn image(&mut self, at: Place, written: &str, kind: ImageKind, luminance: bool) -> Option<Arc<Image>> {
+        let key = (self.resolve(at, written), kind, luminance);
         if let Some(known) = self.images.get(&key) {
             return known.clone();
         }
-        let decoded = self.read(Some(at), &key.0).and_then(|bytes| match decode_image(&bytes, &key.0, kind) {
+        let image =
+            if luminance { self.image(at, written, kind, false).map(grey) } else { self.decode(at, &key.0, kind) };
+        self.images.insert(key, image.clone());
+        image
+    }
+
+    fn decode(&mut self, at: Place, path: &str, kind: ImageKind) -> Option<Arc<Image>> {
+        let bytes = self.read(Some(at), path)?;
+        match decode_image(&bytes, path, kind) {
             Ok(decoded) => {
                 if let Some(note) = decoded.note {
                     self.warn(at, note, "");
@@ -173,37 +211,41 @@ impl<'a> Importer<'a> {
                 self.error(at, message, "");
                 None
             }
-        });
-        self.images.insert(key, decoded.clone());
-        decoded
+        }
     }
 
     /// The mesh file `written` at `at`, read as `options` say; read once however often it is named so.
-    pub fn mesh(&mut self, at: Place, written: &str, options: MeshOptions) -> Option<MeshId> {
+    pub fn mesh(&mut self, at: Place, written: &str, mut options: MeshOptions) -> Option<MeshId> {
         let path = self.resolve(at, written);
-        let own_normals = self.file_normals.get(&path).copied().unwrap_or(false);
+        let (own_normals, versions) = self.mesh_files.get(&path).copied().unwrap_or_default();
+        if versions >= MAX_VERSIONS {
+            options.normals = options.normals.without_scale();
+        }
         let key = MeshKey::new(&path, &options, own_normals);
         if let Some(&known) = self.meshes.get(&key) {
             return known;
         }
-        let id = self.read(Some(at), &path).and_then(|bytes| match mesh_file::parse(&bytes, &path, &options) {
-            Ok(loaded) => {
-                self.file_normals.insert(path.clone(), loaded.own_normals);
-                let key = MeshKey::new(&path, &options, loaded.own_normals);
-                if let Some(&Some(known)) = self.meshes.get(&key) {
-                    return Some(known);
-                }
-                let id = self.add_mesh(loaded.mesh);
-                self.meshes.insert(key, Some(id));
-                Some(id)
-            }
+        let loaded = self.read(Some(at), &path).and_then(|bytes| match mesh_file::parse(&bytes, &path, &options) {
+            Ok(loaded) => Some(loaded),
             Err(e) => {
                 self.file_error(&path, &e.place, &e.message);
                 None
             }
         });
-        self.meshes.entry(key).or_insert(id);
-        id
+        let Some(loaded) = loaded else {
+            self.meshes.insert(key, None);
+            return None;
+        };
+        self.mesh_files.insert(path.clone(), (loaded.own_normals, versions + 1));
+        if versions + 1 == MAX_VERSIONS {
+            let message = format!(
+                "{path:?} has no normals and is scaled in many ways: from here on normals are computed unscaled"
+            );
+            self.warn(at, message, "give the mesh vertex normals");
+        }
+        let id = self.add_mesh(loaded.mesh);
+        self.meshes.insert(MeshKey::new(&path, &options, loaded.own_normals), Some(id));
+        Some(id)
     }
 
     /// Adds a mesh.
@@ -267,6 +309,25 @@ impl<'a> Importer<'a> {
         }
         if diagnostics.has_errors() { Err(SceneError(diagnostics.list)) } else { Ok((self.scene, diagnostics)) }
     }
+}
+
+fn shortened(mut text: String) -> String {
+    if text.len() > MAX_MESSAGE {
+        text.truncate(text.floor_char_boundary(MAX_MESSAGE));
+        text.push_str(" ...");
+    }
+    text
+}
+
+/// A name of an object for messages: not longer than its start.
+pub(super) fn short_name(name: &str) -> String {
+    name.chars().take(MAX_NAME).collect()
+}
+
+fn grey(image: Arc<Image>) -> Arc<Image> {
+    let mut image = image.as_ref().clone();
+    image.texels.iter_mut().for_each(|t| *t = Rgb::splat(t.luminance()));
+    Arc::new(image)
 }
 
 /// `line 3, column 14` of the byte at `offset`, both counted from 1, columns in characters.

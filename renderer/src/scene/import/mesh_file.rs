@@ -24,6 +24,14 @@ impl Normals {
         let seen = if is_similarity(&linear) { DMat3::from_diagonal(DVec3::new(1.0, 1.0, mirror)) } else { linear };
         Self::Smooth(seen)
     }
+
+    /// The same for a mesh that is not scaled, only mirrored if it was.
+    pub fn without_scale(self) -> Self {
+        match self {
+            Self::Smooth(m) => Self::smooth(DMat3::from_diagonal(DVec3::new(1.0, 1.0, m.determinant().signum()))),
+            other => other,
+        }
+    }
 }
 
 /// How a mesh file is read.

@@ -25,12 +25,11 @@ pub(super) fn decode_png(bytes: &[u8], kind: ImageKind, limits: &ImageLimits) ->
     to_linear(&decoded, kind)
 }
 
-/// JPEG, orientation tags not applied. The decoder is used directly and without SIMD, because texels must not depend on the machine,
-/// and strictly, because it would otherwise fill up a truncated picture with grey.
+/// JPEG, orientation tags not applied. The decoder is built without SIMD, because texels must not depend on the machine, and strict,
+/// because it would otherwise fill up a truncated picture with grey.
 pub(super) fn decode_jpeg(bytes: &[u8], kind: ImageKind, limits: &ImageLimits) -> Result<Image, String> {
     let side = limits.side as usize;
-    let options =
-        DecoderOptions::new_safe().set_use_unsafe(false).set_strict_mode(true).set_max_width(side).set_max_height(side);
+    let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(side).set_max_height(side);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     decoder.decode_headers().map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions().ok_or("it has no size")?;

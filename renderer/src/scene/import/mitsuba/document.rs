@@ -1,6 +1,7 @@
 //! Mitsuba's XML as a flat list of objects with typed parameters: `$parameters` substituted, includes merged, names of version
 //! 0.6 spelled as in version 3.
 
+use super::guard;
 use super::parameters::Parameters;
 use super::value::{self, Value};
 use super::xml::Attributes;
@@ -13,6 +14,8 @@ use std::collections::BTreeMap;
 pub(super) const MAX_DEPTH: usize = 64;
 /// More elements, over all included files, are refused.
 const MAX_ELEMENTS: u32 = 4_000_000;
+/// More parameters of one object are refused.
+const MAX_PROPS: usize = 1000;
 /// More included files are refused.
 const MAX_INCLUDES: usize = 1000;
 
@@ -152,6 +155,9 @@ impl Reader<'_, '_> {
     fn file(&mut self, from: Option<Place>, path: &str, parent: Option<NodeId>, depth: usize) {
         let Some((file, bytes)) = self.importer.read_text(from, path) else { return };
         let text = String::from_utf8_lossy(&bytes);
+        if let Err((offset, message)) = guard::check(&bytes) {
+            return self.importer.error(Place { file, offset }, message, "");
+        }
         let options = roxmltree::ParsingOptions { nodes_limit: MAX_ELEMENTS, ..Default::default() };
         let xml = match roxmltree::Document::parse_with_options(&text, options) {
             Ok(xml) => xml,
@@ -294,8 +300,9 @@ impl Reader<'_, '_> {
         attributes.check(self.importer, &["name", "value"]);
         let name = attributes.require(self.importer, "name");
         let value = attributes.require(self.importer, "value");
-        if let (Some(name), Some(value)) = (name, value) {
-            self.parameters.set_default(name, value);
+        let (Some(name), Some(value)) = (name, value) else { return };
+        if let Err(message) = self.parameters.set_default(name, value) {
+            self.importer.error(attributes.at, message, "");
         }
     }
 
@@ -358,7 +365,9 @@ impl Reader<'_, '_> {
         };
         let Some(value) = value else { return };
         let props = &mut self.document.nodes[parent].props;
-        if props.iter().any(|p| p.name == name) {
+        if props.len() >= MAX_PROPS {
+            self.importer.error(at, format!("an object has more than {MAX_PROPS} parameters"), "");
+        } else if props.iter().any(|p| p.name == name) {
             self.importer.error(at, format!("the parameter `{name}` is given twice"), "");
         } else {
             props.push(Prop { name, value, at });

@@ -103,7 +103,7 @@ impl Builder<'_, '_, '_> {
             self.importer.error(reader.node.at, "an environment map needs a `filename`", "");
             return None;
         };
-        let image = self.importer.image(at, name, ImageKind::Srgb)?;
+        let image = self.importer.image(at, name, ImageKind::Srgb, false)?;
         Some(LightDesc::Environment { image, scale: Rgb::splat(scale), to_world: rotation(to_world) * half_turn() })
     }
 

@@ -6,6 +6,7 @@
 mod bsdf;
 mod document;
 mod emitter;
+mod guard;
 mod integrator;
 mod ior;
 mod parameters;

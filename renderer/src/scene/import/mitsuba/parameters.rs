@@ -6,14 +6,21 @@ use std::collections::BTreeMap;
 /// A parameter may not make a value longer than this many bytes.
 const MAX_SUBSTITUTED: usize = 1 << 16;
 
+/// More parameters are refused.
+const MAX_PARAMETERS: usize = 1000;
+
 /// What `<default>` elements have set.
 #[derive(Debug, Default)]
 pub(super) struct Parameters(BTreeMap<String, String>);
 
 impl Parameters {
     /// Sets `name` unless it has a value already.
-    pub fn set_default(&mut self, name: &str, value: &str) {
+    pub fn set_default(&mut self, name: &str, value: &str) -> Result<(), String> {
+        if self.0.len() >= MAX_PARAMETERS {
+            return Err(format!("there are more than {MAX_PARAMETERS} parameters"));
+        }
         self.0.entry(name.to_string()).or_insert_with(|| value.to_string());
+        Ok(())
     }
 
     /// Replaces `$name` by the parameter's value; the longest known name wins, `\$` stays a dollar sign.

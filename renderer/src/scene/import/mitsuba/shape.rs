@@ -5,7 +5,7 @@ use super::document::NodeId;
 use super::reader::Reader;
 use crate::math::DAffine3;
 use crate::scene::desc::{ShapeDesc, ShapeKind};
-use crate::scene::import::importer::Place;
+use crate::scene::import::importer::{Place, short_name};
 use crate::scene::import::mesh_file::{MeshOptions, Normals};
 use crate::scene::import::number::Bound;
 use crate::scene::import::transform::is_similarity;
@@ -64,7 +64,7 @@ impl Builder<'_, '_, '_> {
     fn shape_name(&mut self, id: NodeId) -> String {
         let node = &self.document.nodes[id];
         if !node.id.is_empty() {
-            return node.id.clone();
+            return short_name(&node.id);
         }
         let count = self.shape_names.entry(node.plugin.clone()).or_default();
         *count += 1;

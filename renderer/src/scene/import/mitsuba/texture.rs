@@ -8,7 +8,6 @@ use crate::scene::import::image::ImageKind;
 use crate::scene::import::number::Bound;
 use crate::spectrum::Rgb;
 use crate::texture::{Filter, FloatParam, RgbParam, Texture, TextureId, UvTransform, Wrap};
-use std::sync::Arc;
 
 /// The textures that can be rendered.
 const TEXTURES: [&str; 2] = ["bitmap", "checkerboard"];
@@ -23,20 +22,19 @@ impl Builder<'_, '_, '_> {
         }
         let node = &self.document.nodes[id];
         let texture = match node.plugin.as_str() {
-            "bitmap" => self.bitmap(id),
-            "checkerboard" => Some(self.checkerboard(id)),
+            "bitmap" => self.bitmap(id, luminance),
+            "checkerboard" => Some(self.checkerboard(id, luminance)),
             _ => {
                 self.unsupported(node.at, id, &TEXTURES);
                 None
             }
         };
-        let texture = texture.map(|t| if luminance { grey(t) } else { t });
         let texture = texture.map(|t| self.importer.add_texture(t));
         self.textures.insert((id, luminance), texture);
         texture
     }
 
-    fn bitmap(&mut self, id: NodeId) -> Option<Texture> {
+    fn bitmap(&mut self, id: NodeId, luminance: bool) -> Option<Texture> {
         let mut reader = self.reader(id);
         let importer = &mut *self.importer;
         let file = reader.string(importer, "filename");
@@ -67,20 +65,21 @@ impl Builder<'_, '_, '_> {
             importer.error(at, "a bitmap needs a `filename`", "");
             return None;
         };
-        let image = importer.image(at, name, if raw { ImageKind::Raw } else { ImageKind::Srgb })?;
+        let image = importer.image(at, name, if raw { ImageKind::Raw } else { ImageKind::Srgb }, luminance)?;
         Some(Texture::Image { image, wrap, filter, uv, scale: Rgb::ONE })
     }
 
     /// Where floor(2 u) + floor(2 v) is even, `color0`. (For numbers, as a roughness, Mitsuba 3.9 swaps the two: plainly a fault,
     /// not copied here.)
-    fn checkerboard(&mut self, id: NodeId) -> Texture {
+    fn checkerboard(&mut self, id: NodeId, luminance: bool) -> Texture {
         let mut reader = self.reader(id);
         let importer = &mut *self.importer;
         let mut colour = |name, default| {
             if let Some((child, _)) = reader.named_child(name) {
                 importer.error(child.at, "a texture inside a checkerboard is not supported", "give it an <rgb>");
             }
-            reader.rgb(importer, name, Bound::NotNegative).unwrap_or(Rgb::splat(default))
+            let colour = reader.rgb(importer, name, Bound::NotNegative).unwrap_or(Rgb::splat(default));
+            if luminance { Rgb::splat(colour.luminance()) } else { colour }
         };
         let (a, b) = (colour("color0", 0.4), colour("color1", 0.2));
         let uv = to_uv(&mut reader, importer);
@@ -130,16 +129,4 @@ fn to_uv(reader: &mut Reader, importer: &mut crate::scene::import::importer::Imp
     let [ou, ov] = ["uoffset", "voffset"].map(|name| reader.float_or(importer, name, Bound::Any, 0.0));
     let scaled = [su * rows[0], su * rows[1], su * rows[2] + ou, sv * rows[3], sv * rows[4], sv * rows[5] + ov];
     UvTransform(scaled.map(|v| v as f32))
-}
-
-fn grey(texture: Texture) -> Texture {
-    let luminance = |c: Rgb| Rgb::splat(c.luminance());
-    match texture {
-        Texture::Image { image, wrap, filter, uv, scale } => {
-            let mut image = image.as_ref().clone();
-            image.texels.iter_mut().for_each(|t| *t = luminance(*t * scale));
-            Texture::Image { image: Arc::new(image), wrap, filter, uv, scale: Rgb::ONE }
-        }
-        Texture::Checkerboard { a, b, uv } => Texture::Checkerboard { a: luminance(a), b: luminance(b), uv },
-    }
 }

@@ -23,8 +23,12 @@ use std::collections::BTreeMap;
 use table::Table;
 use toml::de::DeTable;
 
-/// Larger scene files are refused.
-const MAX_BYTES: usize = 64 << 20;
+/// Larger scene files are refused: the parser takes some hundred bytes for each of theirs.
+const MAX_BYTES: usize = 8 << 20;
+/// Of larger files only the first error of the TOML itself is found: the parser keeps all that it finds, one for each byte at worst.
+const MAX_BYTES_FOR_ALL: usize = 1 << 20;
+/// Errors of the TOML itself beyond these are not listed.
+const MAX_SYNTAX_ERRORS: usize = 50;
 
 /// Imports the scene file `root`.
 pub(super) fn import(importer: &mut Importer, root: &str) {
@@ -35,20 +39,13 @@ pub(super) fn import(importer: &mut Importer, root: &str) {
         return importer.error(at, message, "move meshes to PLY files");
     }
     let text = String::from_utf8_lossy(&bytes);
-    let (entries, errors) = DeTable::parse_recoverable(&text);
-    // Of the errors in one line all but the first follow from it.
-    let mut last = usize::MAX;
-    for e in &errors {
-        let at = Place { file, offset: e.span().map_or(0, |s| s.start) };
-        let line = bytes[..at.offset.min(bytes.len())].iter().filter(|&&b| b == b'\n').count();
-        if line == std::mem::replace(&mut last, line) {
-            continue;
+    let entries = match DeTable::parse(&text) {
+        Ok(entries) => entries,
+        Err(_) if bytes.len() <= MAX_BYTES_FOR_ALL => {
+            return syntax_errors(importer, file, &bytes, &DeTable::parse_recoverable(&text).1);
         }
-        importer.error(at, format!("this is not TOML: {}", e.message().trim().replace('\n', ", ")), "");
-    }
-    if !errors.is_empty() {
-        return;
-    }
+        Err(first) => return syntax_errors(importer, file, &bytes, &[first]),
+    };
     let mut root = Table::root(file, entries.get_ref());
     let part = gltf_part(importer, &mut root);
     // A glTF file that can't be read might have had a camera.
@@ -62,6 +59,22 @@ pub(super) fn import(importer: &mut Importer, root: &str) {
         grey: None,
     };
     builder.scene(root, &part);
+}
+
+/// Lists one error for each line: the others follow from it.
+fn syntax_errors(importer: &mut Importer, file: usize, text: &[u8], errors: &[toml::de::Error]) {
+    let mut last: Option<usize> = None;
+    let mut listed = 0;
+    for e in errors {
+        let offset = e.span().map_or(0, |s| s.start).min(text.len());
+        let between = last.map(|last| &text[last.min(offset)..last.max(offset)]);
+        if listed < MAX_SYNTAX_ERRORS && between.is_none_or(|b| b.contains(&b'\n')) {
+            listed += 1;
+            let message = format!("this is not TOML: {}", e.message().trim().replace('\n', ", "));
+            importer.error(Place { file, offset }, message, "");
+        }
+        last = Some(offset);
+    }
 }
 
 /// Starts the scene with the glTF file that `gltf` names, if any.

@@ -6,7 +6,7 @@ use crate::diagnostics::nearest;
 use crate::geometry::MeshId;
 use crate::math::{DAffine3, DVec3};
 use crate::scene::desc::{Emission, ShapeDesc, ShapeKind};
-use crate::scene::import::importer::Place;
+use crate::scene::import::importer::{Place, short_name};
 use crate::scene::import::number::Bound;
 use crate::scene::import::transform::is_similarity;
 
@@ -41,7 +41,7 @@ impl<'t> Builder<'t, '_, '_> {
 
     fn shape(&mut self, mut table: Table<'t>, default_name: String) {
         let at = table.at;
-        let name = table.string(self.importer, "name").map_or(default_name, |(name, _)| name.into());
+        let name = table.string(self.importer, "name").map_or(default_name, |(name, _)| short_name(name));
         let Some(kind) = table.kind(self.importer, &KINDS) else { return };
         let mut to_world = transform::of(self.importer, &mut table);
         let kind = match kind {

@@ -126,7 +126,7 @@ pub(super) fn picture(importer: &mut Importer, table: &mut Table, kind: ImageKin
     match (file, size, pixels) {
         (Some(file), None, None) => {
             let name = file.string(importer, "file")?;
-            importer.image(file.at, name, kind)
+            importer.image(file.at, name, kind, false)
         }
         (None, Some(size), Some(pixels)) => written_picture(importer, size, pixels).map(Arc::new),
         _ => {

@@ -122,6 +122,40 @@ fn hostile_documents_end() {
 }
 
 #[test]
+fn what_costs_the_parser_a_square_is_refused() {
+    let many: String = (0..200_000).map(|i| format!(" a{i}=''")).collect();
+    fault(&format!("\n<shape type='cube'{many}/>"), 3, &["more than 32 attributes"]);
+    let deep: String = (0..50_000).map(|i| format!("<a xmlns:n{i}='x'>")).collect();
+    fault(&format!("\n{deep}"), 3, &["name spaces"]);
+    // Neither is found where there is no tag.
+    let quiet = format!("<!-- <a xmlns:b='c'{many}> --><shape type='cube' id=\"a = b > c{many}\"/>");
+    assert!(faults(&quiet).is_empty());
+    let props: String = (0..2000).map(|i| format!("<float name='a{i}' value='1'/>")).collect();
+    assert!(!faults(&format!("<shape type='cube'>{props}</shape>")).is_empty());
+    let defaults: String = (0..2000).map(|i| format!("<default name='a{i}' value='1'/>")).collect();
+    assert!(!faults(&defaults).is_empty());
+    // Long names, and many of them, are not compared.
+    let long = "n".repeat(2_000_000);
+    fault(
+        &format!("<bsdf type='diffuse' id='{long}'/><shape type='cube'>\n<ref id='{long}m'/></shape>"),
+        3,
+        &["no object"],
+    );
+}
+
+#[test]
+fn many_scales_of_one_mesh_end() {
+    let shape = |i| {
+        format!(
+            "<shape type='obj'><string name='filename' value='models/t.obj'/><transform name='to_world'><scale x='1.{i}'/></transform></shape>"
+        )
+    };
+    let (scene, warnings) = super::import_with_warnings(&(0..200).map(shape).collect::<String>());
+    assert_eq!((scene.shapes.len(), warnings.len()), (200, 1), "{warnings:#?}");
+    assert!(scene.meshes.len() <= 65, "{}", scene.meshes.len());
+}
+
+#[test]
 fn damaged_scenes_never_panic() {
     let valid = "<scene version='3.0.0'><default name='x' value='2'/>
         <sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='0.1'/>

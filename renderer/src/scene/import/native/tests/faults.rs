@@ -91,6 +91,18 @@ fn broken_files() {
 }
 
 #[test]
+fn hostile_files_end() {
+    let junk = "= ".repeat(500_000);
+    assert!(!errors(&[("s.toml", junk.as_bytes())]).is_empty());
+    let lines = "=\n".repeat(300_000);
+    assert!(errors(&[("s.toml", lines.as_bytes())]).len() <= 50);
+    let large = format!("#{}", " ".repeat(9 << 20));
+    assert_error(&[("s.toml", large.as_bytes())], &["larger than 8 MiB"]);
+    let unknown: String = (0..50_000).map(|i| format!("k{i} = 1\n")).collect();
+    assert!(errors(&[("s.toml", unknown.as_bytes())]).len() <= 201);
+}
+
+#[test]
 fn damaged_scenes_never_panic() {
     let valid = "[camera]\nfrom = [0, 1, 5]\nto = [0, 0, 0]\nfov = 40\n[render]\nspp = 4\nfilter = { kind = 'tent' }
 [textures.t]\nkind = 'image'\nsize = [2, 1]\npixels = [1, '#00ff00']\nuv = { scale = 2 }
