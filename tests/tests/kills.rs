@@ -1,5 +1,7 @@
 //! The same job gives the same bytes, whatever happens to those who work on it.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
+
 use e2e::{Farm, Job, assert_same_pixels, lightfarm, room, until};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
