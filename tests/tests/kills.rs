@@ -11,7 +11,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Some seconds of work on one core, in some tens of units.
 fn options(integrator: &str) -> Vec<&str> {
-    let spp = if integrator == "light" { "96" } else { "48" };
+    let spp = if integrator == "light" { "768" } else { "512" };
     vec!["--integrator", integrator, "--spp", spp, "--size", "128x96", "--seed", "7"]
 }
 

@@ -81,7 +81,7 @@ impl Accel {
                 items.push(Item::instance(object, *tree, mesh, o.to_world));
             }
         }
-        if let Some(bad) = items.iter().find(|i| !(i.bounds.reach() <= LIMIT)) {
+        if let Some(bad) = items.iter().find(|i| !i.bounds.reach().is_finite()) {
             return Err(AccelError::TooLarge { object: bad.object.0 as usize });
         }
         let build = |mesh: usize| Tree::build(&triangles(&geometry.meshes[mesh]).collect::<Vec<_>>());

@@ -39,7 +39,8 @@ impl Model for Conductor {
         };
         let Some(wm) = reflecting_facet(wo, wi) else { return (Rgb::ZERO, 0.0) };
         let pdf = 0.25 * facets.d(wm) * facets.g1_over_cos(wo);
-        (self.fresnel(wo.dot(wm)) * (pdf * facets.g1_over_cos(wi)), pdf)
+        let g = facets.shadowing_over_cos(wo) * facets.shadowing_over_cos(wi);
+        (self.fresnel(wo.dot(wm)) * (0.25 * facets.d(wm) * g), pdf)
     }
 
     fn sample(&self, wo: Vec3, _: f32, u: Vec2, mode: Transport) -> Option<BsdfSample> {

@@ -98,14 +98,18 @@ impl Model for Dielectric {
             let Some(wm) = reflecting_facet(wo, wi) else { return NONE };
             let Some(split) = self.split(fresnel::dielectric(wo.dot(wm).abs(), eta).reflectance) else { return NONE };
             let visible = 0.25 * facets.d(wm) * facets.g1_over_cos(wo);
-            return (split.reflected * (visible * facets.g1_over_cos(wi)), visible * split.p_reflect);
+            return (
+                split.reflected * (0.25 * facets.d(wm) * facets.shadowing_over_cos(wo) * facets.shadowing_over_cos(wi)),
+                visible * split.p_reflect,
+            );
         }
         // Transmission.
         let Some((wm, jacobian)) = refracting_facet(wo, wi, eta) else { return NONE };
         let (cos_o, cos_i) = (wo.dot(wm).abs(), wi.dot(wm).abs());
         let Some(split) = self.split(fresnel::dielectric_reflectance(cos_o, cos_i, eta)) else { return NONE };
         let visible = facets.d(wm) * facets.g1_over_cos(wo) * cos_o * cos_i * jacobian;
-        let f = split.transmitted * (visible * facets.g1_over_cos(wi) * radiance_scale(eta, mode));
+        let g = facets.shadowing_over_cos(wo) * facets.shadowing_over_cos(wi);
+        let f = split.transmitted * (facets.d(wm) * g * cos_o * cos_i * jacobian * radiance_scale(eta, mode));
         (f, visible * (1.0 - split.p_reflect))
     }
 
