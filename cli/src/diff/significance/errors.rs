@@ -30,10 +30,21 @@ impl Errors {
             let names = CHANNELS.map(|c| format!("{name}.{c}"));
             p.triple([&names[0], &names[1], &names[2]])
         };
-        if let (Some(block), Some(image)) = (layer("blockerror"), p.metadata.as_ref().and_then(|m| m.channels)) {
-            return Some(Self::Groups { block, image });
-        }
         let square = |v: Vec<[f32; 3]>| v.into_iter().map(|p| p.map(|s| s * s)).collect();
+        let own = p.metadata.as_ref().and_then(|m| m.channels.map(|image| (image, &m.settings["integrator"])));
+        match (own, layer("blockerror"), layer("stderror")) {
+            // No two pixels of a path tracer share a sample: hundreds of pixel errors tell a block's error better than its own few
+            // groups do, whose chance of being far too small the t-test of two images underrates.
+            (Some((image, kind)), _, Some(errors)) if kind == "path" => {
+                let pixel = FilterDesc::Box { radius: 0.5 };
+                let filter = [Filter::new(&pixel, p.width, 1), Filter::new(&pixel, p.height, 1)];
+                let name = format!("pixel errors of {} replicate groups", image.groups);
+                let dof = f64::from(image.groups) - 1.0;
+                return Some(Self::Pixels { variance: square(errors), dof, filter, name });
+            }
+            (Some((image, _)), Some(block), _) => return Some(Self::Groups { block, image }),
+            _ => {}
+        }
         let variance = layer("variance").or_else(|| layer("stderror").map(square))?;
         let (desc, name) = match assume.filter {
             Some(f) => (f, filter_name(&f)),
