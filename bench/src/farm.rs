@@ -138,7 +138,7 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// User and system time of a process, where the system tells (Linux: fields 14 and 15 of its stat file, in hundredths).
-fn cpu_seconds(pid: u32) -> Option<f64> {
+pub fn cpu_seconds(pid: u32) -> Option<f64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
     let ticks: f64 = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;

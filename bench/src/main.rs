@@ -1,5 +1,6 @@
-//! Figures: rays per second, samples per second, what the farm costs. See `README.md` beside this crate.
+//! Figures: rays per second, samples per second, error against time, what the farm costs. See `README.md` beside this crate.
 
+mod error;
 mod farm;
 mod meshes;
 mod rays;
@@ -25,6 +26,8 @@ enum What {
     Rays(rays::Args),
     /// Samples per second of whole renders.
     Samples(samples::Args),
+    /// Error against time of integrators, compared.
+    Error(error::Args),
     /// Two one-thread workers against one two-thread render.
     Farm(farm::Args),
 }
@@ -34,6 +37,7 @@ fn main() -> ExitCode {
     let result = match &cli.what {
         What::Rays(args) => rays::run(args).map(|r| show(cli.json, &r, rays::table)),
         What::Samples(args) => samples::run(args).map(|r| show(cli.json, &r, |r| samples::table(r))),
+        What::Error(args) => error::run(args).map(|r| show(cli.json, &r, ToString::to_string)),
         What::Farm(args) => farm::run(args).map(|r| show(cli.json, &r, ToString::to_string)),
     };
     match result {
