@@ -1,5 +1,7 @@
-//! Figures: rays per second, samples per second, error against time, what the farm costs. See `README.md` beside this crate.
+//! Figures: rays per second, samples per second, error against time, what the farm costs; whether integrators agree. See `README.md`
+//! beside this crate.
 
+mod agree;
 mod error;
 mod farm;
 mod meshes;
@@ -30,20 +32,24 @@ enum What {
     Error(error::Args),
     /// Two one-thread workers against one two-thread render.
     Farm(farm::Args),
+    /// Whether all integrators render the same pictures; exit status 1 when they don't.
+    Agree(agree::Args),
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    let figures = |text: String| (text, true);
     let result = match &cli.what {
-        What::Rays(args) => rays::run(args).map(|r| show(cli.json, &r, rays::table)),
-        What::Samples(args) => samples::run(args).map(|r| show(cli.json, &r, |r| samples::table(r))),
-        What::Error(args) => error::run(args).map(|r| show(cli.json, &r, ToString::to_string)),
-        What::Farm(args) => farm::run(args).map(|r| show(cli.json, &r, ToString::to_string)),
+        What::Rays(args) => rays::run(args).map(|r| figures(show(cli.json, &r, rays::table))),
+        What::Samples(args) => samples::run(args).map(|r| figures(show(cli.json, &r, |r| samples::table(r)))),
+        What::Error(args) => error::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
+        What::Farm(args) => farm::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
+        What::Agree(args) => agree::run(args).map(|r| (show(cli.json, &r, agree::table), r.passed)),
     };
     match result {
-        Ok(text) => {
+        Ok((text, passed)) => {
             println!("{text}");
-            ExitCode::SUCCESS
+            if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
         }
         Err(message) => {
             eprintln!("error: {message}");

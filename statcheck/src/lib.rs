@@ -5,6 +5,7 @@
 mod beta;
 mod binomial;
 mod chi2;
+mod estimate;
 mod gamma;
 mod mean;
 mod normal;
@@ -13,6 +14,7 @@ mod ttest;
 pub use beta::regularized_beta;
 pub use binomial::clopper_pearson;
 pub use chi2::{Chi2, chi2_test, chi2_test_fixed_total, chi2_test_with_errors};
+pub use estimate::{Estimate, Welch, family_p_value, rms_deviate};
 pub use gamma::upper_gamma;
 pub use mean::Mean;
 pub use normal::{normal_cdf, normal_p_value, normal_quantile, z_test};

@@ -5,6 +5,7 @@ use renderer::film::exr::Picture;
 use renderer::film::{ChannelMeans, Filter};
 use renderer::math::Vec2;
 use renderer::scene::desc::FilterDesc;
+use statcheck::Estimate;
 use std::ops::Range;
 
 /// How files with pixel variances were made.
@@ -63,34 +64,29 @@ impl Errors {
         }
     }
 
-    /// Variance and degrees of freedom of the mean over a block.
-    pub(super) fn block(&self, width: u32, x: &Range<u32>, y: &Range<u32>, c: usize) -> (f64, f64) {
+    /// The `mean` over a block, with its error.
+    pub(super) fn block(&self, mean: f64, width: u32, x: &Range<u32>, y: &Range<u32>, c: usize) -> Estimate {
         match self {
             Self::Groups { block, image } => {
                 let se = f64::from(block[(y.start * width + x.start) as usize][c]);
-                (se * se, f64::from(image.groups) - 1.0)
+                Estimate { mean, variance: se * se, dof: f64::from(image.groups) - 1.0 }
             }
             Self::Pixels { variance, dof, filter, .. } => {
-                let (mut sum, mut squares) = (0.0, 0.0);
-                for i in y.clone().flat_map(|y| x.clone().map(move |x| (y * width + x) as usize)) {
-                    let v = f64::from(variance[i][c]);
-                    sum += v;
-                    squares += v * v;
-                }
+                let pixels = y.clone().flat_map(|y| x.clone().map(move |x| (y * width + x) as usize));
                 let inflation = inflation(&filter[0], x) * inflation(&filter[1], y);
-                let n = (x.len() * y.len()) as f64;
-                // Welch-Satterthwaite; as many pixels as share a sample count once.
-                let effective = if squares > 0.0 { (sum * sum / squares * dof / inflation).max(*dof) } else { *dof };
-                (sum * inflation / (n * n), effective)
+                Estimate::pooled(mean, pixels.map(|i| f64::from(variance[i][c])), *dof, inflation)
             }
         }
     }
 
-    /// Variance and degrees of freedom of the mean over the image.
-    pub(super) fn image(&self, width: u32, height: u32, c: usize) -> (f64, f64) {
+    /// The `mean` over the image, with its error.
+    pub(super) fn image(&self, mean: f64, width: u32, height: u32, c: usize) -> Estimate {
         match self {
-            Self::Groups { image, .. } => (image.std_error[c] * image.std_error[c], f64::from(image.groups) - 1.0),
-            Self::Pixels { .. } => self.block(width, &(0..width), &(0..height), c),
+            Self::Groups { image, .. } => {
+                let variance = image.std_error[c] * image.std_error[c];
+                Estimate { mean, variance, dof: f64::from(image.groups) - 1.0 }
+            }
+            Self::Pixels { .. } => self.block(mean, width, &(0..width), &(0..height), c),
         }
     }
 }

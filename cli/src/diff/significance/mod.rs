@@ -13,6 +13,7 @@ use errors::Errors;
 use renderer::film::ERROR_BLOCK;
 use renderer::film::exr::Picture;
 use serde::Serialize;
+use statcheck::Estimate;
 use std::ops::Range;
 
 /// Probability that any of the tests rejects although both pictures estimate the same.
@@ -21,14 +22,6 @@ const FAMILY: f64 = 0.01;
 const ROUNDING: f64 = 1e-5;
 /// Names of the channels.
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
-
-/// A mean of pixels with its variance.
-#[derive(Clone, Copy, Debug)]
-struct Estimate {
-    mean: f64,
-    variance: f64,
-    dof: f64,
-}
 
 /// One t-test.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -81,8 +74,8 @@ pub fn test(pair: &Pair, a: &Picture, b: &Picture, assume: &Assumptions) -> Opti
     } else {
         let one = |c: usize| {
             let estimate = |e: &Errors, v: &[[f32; 3]]| {
-                let (variance, dof) = e.image(pair.width, pair.height, c);
-                Estimate { mean: mean(v, pair.width, &whole.0, &whole.1, c), variance, dof }
+                let mean = mean(v, pair.width, &whole.0, &whole.1, c);
+                e.image(mean, pair.width, pair.height, c)
             };
             welch(c, None, estimate(&ea, &pair.a), estimate(&eb, &pair.b))
         };
@@ -96,10 +89,7 @@ pub fn test(pair: &Pair, a: &Picture, b: &Picture, assume: &Assumptions) -> Opti
         let (x, y) = (x0..(x0 + ERROR_BLOCK).min(pair.width), y0..(y0 + ERROR_BLOCK).min(pair.height));
         let comparable = y.clone().all(|y| x.clone().all(|x| pair.valid[(y * pair.width + x) as usize]));
         let one = |c: usize| {
-            let estimate = |e: &Errors, v: &[[f32; 3]]| {
-                let (variance, dof) = e.block(pair.width, &x, &y, c);
-                Estimate { mean: mean(v, pair.width, &x, &y, c), variance, dof }
-            };
+            let estimate = |e: &Errors, v: &[[f32; 3]]| e.block(mean(v, pair.width, &x, &y, c), pair.width, &x, &y, c);
             welch(c, Some([x0, y0]), estimate(&ea, &pair.a), estimate(&eb, &pair.b))
         };
         let tests: Vec<Test> = if comparable { (0..3).filter_map(one).collect() } else { Vec::new() };
@@ -116,33 +106,19 @@ fn mean(pixels: &[[f32; 3]], width: u32, x: &Range<u32>, y: &Range<u32>, c: usiz
 
 /// Welch's test with an allowance for rounding; `None` when an error is not known.
 fn welch(c: usize, block: Option<[u32; 2]>, a: Estimate, b: Estimate) -> Option<Test> {
-    let rounding = ROUNDING * a.mean.abs().max(b.mean.abs());
-    let difference = a.mean - b.mean;
-    let sum = a.variance + b.variance;
-    if !sum.is_finite() {
-        return None;
-    }
-    let square = |e: Estimate| e.variance * e.variance / e.dof;
-    let dof = if sum > 0.0 { sum * sum / (square(a) + square(b)) } else { a.dof.min(b.dof) };
-    let (t, p) = if difference.abs() <= rounding {
-        (0.0, 1.0)
-    } else {
-        let t = difference / (sum + rounding * rounding).sqrt();
-        (t, 2.0 * statcheck::student_cdf(-t.abs(), dof))
-    };
-    Some(Test { channel: CHANNELS[c], block, a: a.mean, b: b.mean, t, dof, p })
+    let w = a.welch(&b, ROUNDING)?;
+    Some(Test { channel: CHANNELS[c], block, a: a.mean, b: b.mean, t: w.t, dof: w.dof, p: w.p })
 }
 
 fn conclude([a, b]: [String; 2], image: Vec<Test>, blocks: Vec<Test>, blocks_skipped: usize) -> Agreement {
     let count = image.len() + blocks.len();
-    let z = |t: &Test| statcheck::normal_quantile((0.5 * t.p).max(1e-300));
-    let block_rms_z = (blocks.iter().map(|t| z(t) * z(t)).sum::<f64>() / blocks.len().max(1) as f64).sqrt();
+    let block_rms_z = statcheck::rms_deviate(blocks.iter().map(|t| t.p));
     let mut worst: Vec<Test> = image.iter().chain(&blocks).cloned().collect();
     worst.sort_by(|x, y| x.p.total_cmp(&y.p));
     worst.truncate(8);
     let least = worst.first().map_or(1.0, |t| t.p);
     let agree = least >= statcheck::sidak(FAMILY, count);
-    let family_p = -renderer::math::fns::exp_m164(count as f64 * renderer::math::fns::ln_1p64(-least.min(1.0 - 1e-16)));
+    let family_p = statcheck::family_p_value(least, count);
     Agreement { a, b, image, block_tests: blocks.len(), blocks_skipped, block_rms_z, worst, family_p, agree }
 }
 

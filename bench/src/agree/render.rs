@@ -1,0 +1,84 @@
+//! Rendering until the image mean is known well enough.
+
+use super::picture::Picture;
+use renderer::film::MergedImage;
+use renderer::integrator::IntegratorKind;
+use renderer::job::{LocalOptions, RenderOptions, RenderSettings, Stop, render_local};
+use renderer::scene::Scene;
+use std::time::Instant;
+
+/// How much is rendered. It follows from what is in the pictures, never from a clock, so that the verdict does not either.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Samples per pixel of the pilot, which tells how many more are needed.
+    pub pilot_spp: u32,
+    /// Half width of the 99 % interval of the image mean to aim at, relative.
+    pub aim: f64,
+    /// Half width that must be reached.
+    pub required: f64,
+    /// Most rays of a picture, unless it would then have fewer than `least_spp`.
+    pub rays: f64,
+    /// Samples that a pixel needs for its error to be told at all.
+    pub least_spp: u32,
+}
+
+/// A picture and what it took.
+#[derive(Debug)]
+pub struct Rendering {
+    /// The picture.
+    pub image: MergedImage,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// Seconds, the pilot not counted.
+    pub seconds: f64,
+}
+
+/// What to render.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The integrator.
+    pub kind: IntegratorKind,
+    /// Size of the picture.
+    pub size: (u32, u32),
+    /// Depth limit, if not that of the scene.
+    pub max_depth: Option<u32>,
+    /// Seed; that of the pilot follows from it.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl Task<'_> {
+    /// Renders a pilot, and then with as many samples as the pilot says are needed.
+    ///
+    /// The pilot is thrown away: samples that decide how many more there will be would bias the picture.
+    pub fn run(&self, effort: &Effort) -> Result<Rendering, String> {
+        let pilot = self.render(effort.pilot_spp, !self.seed)?;
+        let half = Picture::Rendered(&pilot.image, self.kind).half_width();
+        let rays_per_spp = pilot.image.counters.rays as f64 / f64::from(effort.pilot_spp);
+        let needed = f64::from(effort.pilot_spp) * (half / effort.aim) * (half / effort.aim);
+        // NaN, where the pilot could not tell, takes all that is allowed.
+        let spp = needed.min(effort.rays / rays_per_spp.max(1.0)).max(f64::from(effort.least_spp));
+        // Whole samples for each group.
+        self.render((spp / 16.0).ceil().min(1e6) as u32 * 16, self.seed)
+    }
+
+    fn render(&self, spp: u32, seed: u64) -> Result<Rendering, String> {
+        let options = RenderOptions {
+            integrator: Some(self.kind),
+            spp: Some(spp),
+            size: Some(self.size),
+            max_depth: self.max_depth.map(|n| i32::try_from(n).unwrap_or(-1)),
+            seed: Some(seed),
+            ..Default::default()
+        };
+        let settings = RenderSettings::resolve(&options, &self.scene.defaults).map_err(|e| e.to_string())?;
+        let started = Instant::now();
+        let options = LocalOptions { threads: self.threads };
+        let outcome =
+            render_local(self.scene, &settings, &options, &Stop::new(), &mut |_| {}).map_err(|e| e.to_string())?;
+        Ok(Rendering { image: outcome.image, spp, seconds: started.elapsed().as_secs_f64() })
+    }
+}
