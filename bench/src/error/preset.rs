@@ -62,3 +62,21 @@ pub fn find(name: &str) -> Result<Preset, String> {
     let found = PRESETS.iter().find(|p| p.name == name);
     found.copied().ok_or_else(|| format!("there is no preset {name:?} (known: {})", known()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::variant::Variant;
+
+    #[test]
+    fn presets_are_found_by_name_and_make_sense() {
+        for p in PRESETS {
+            assert_eq!(find(p.name).unwrap().scene, p.scene);
+            assert!(p.reference.is_some() || p.size.is_some(), "{}", p.name);
+            // What is compared may be more than this build has; path is always there.
+            let known: Vec<Variant> = p.variants.iter().filter_map(|v| v.parse().ok()).collect();
+            assert!(known.iter().any(|v| v.kind == renderer::integrator::IntegratorKind::Path), "{}", p.name);
+        }
+        assert!(find("cornell").is_err());
+    }
+}

@@ -93,13 +93,13 @@ impl Report {
         let n = self.name_width();
         writeln!(f, "\ntime to the same error, as a ratio (above 1: the second is faster)")?;
         let cells = |cells: Vec<String>| cells.iter().map(|c| format!("{c:<28}")).collect::<Vec<_>>().join("  ");
-        let titles = ["relMSE", "relMSE, CPU time", "MSE", "dark MSE", "dark relMSE"];
+        let titles = ["relMSE", "relMSE, CPU time", "trimmed", "MSE", "dark MSE", "dark relMSE"];
         writeln!(f, "{:n$}  {}", "", cells(titles.map(String::from).to_vec()).trim_end())?;
         for r in &self.ratios {
             let by = |m| interval(r.seconds.of(m));
             let cpu = r.relmse_cpu_seconds.map_or("?".into(), |i| interval(&i));
-            let columns =
-                vec![by(Measure::RelMse), cpu, by(Measure::Mse), by(Measure::DarkMse), by(Measure::DarkRelMse)];
+            let others = [Measure::RelMseTrimmed, Measure::Mse, Measure::DarkMse, Measure::DarkRelMse];
+            let columns = [by(Measure::RelMse), cpu].into_iter().chain(others.map(by)).collect();
             let mark = if r.flagged { "  (!)" } else { "" };
             writeln!(f, "{:n$}  {}{mark}", format!("{} / {}", r.a, r.b), cells(columns).trim_end())?;
         }
