@@ -3,6 +3,7 @@
 use crate::exit::Failure;
 use clap::Args;
 use renderer::integrator::IntegratorKind;
+use renderer::integrator::mmlt::MmltOptions;
 use renderer::job::RenderOptions;
 use std::path::{Path, PathBuf};
 
@@ -10,12 +11,18 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Render options")]
 pub struct RenderArgs {
-    /// Light transport algorithm (path, light)
+    /// Light transport algorithm (path, light, bdpt, mmlt)
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<IntegratorKind>,
     /// Samples (or light paths) per pixel
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub spp: Option<u32>,
+    /// Mutations per pixel (mmlt)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
+    pub mpp: Option<u32>,
+    /// How mmlt runs its chains, for experiments: `plain` = as published, or KEY=VALUE,...
+    #[arg(long, value_name = "OPTIONS")]
+    pub mmlt: Option<MmltOptions>,
     /// Wall time, such as 60s, 5m or 1h30m; ends with the pass in which it runs out
     #[arg(long, value_name = "TIME", value_parser = seconds)]
     pub time: Option<f64>,
@@ -39,6 +46,8 @@ impl RenderArgs {
         RenderOptions {
             integrator: self.integrator,
             spp: self.spp,
+            mpp: self.mpp,
+            mmlt: self.mmlt.unwrap_or_default(),
             time_s: self.time,
             target_error: self.target_error,
             size: self.size,

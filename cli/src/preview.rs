@@ -2,7 +2,7 @@
 
 use crate::save;
 use renderer::film::{ErrorSummary, png};
-use renderer::job::Merger;
+use renderer::job::{Merger, Sampling};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -73,8 +73,8 @@ impl Preview {
             let done = merger.next_unit();
             let plan = merger.plan();
             self.covered = plan.pass > 0
-                || (plan.splats && done > 0)
-                || (self.seen..done).any(|unit| plan.ends_group(unit).is_some());
+                || (plan.sampling == Sampling::Paths && done > 0)
+                || (self.seen..done).any(|unit| plan.covers_film(unit));
             self.seen = done;
         }
         self.covered

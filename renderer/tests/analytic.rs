@@ -3,7 +3,9 @@
 mod common;
 
 use common::{assert_mean, assert_same_mean, build, camera, emission, lambert, render, render_with, shape};
-use renderer::integrator::IntegratorKind::{Light, Path};
+use renderer::film::MergedImage;
+use renderer::integrator::IntegratorKind;
+use renderer::integrator::IntegratorKind::{Bdpt, Light, Mmlt, Path};
 use renderer::job::{RenderOptions, RenderSettings};
 use renderer::math::{DAffine3, DQuat, DVec3};
 use renderer::scene::Scene;
@@ -30,7 +32,7 @@ fn a_glowing_closed_sphere_is_the_geometric_series() {
     // Le / (1 - albedo), or its first terms under a depth limit; at any size and place.
     for (radius, centre) in [(1.0, DVec3::ZERO), (1e-3, DVec3::X * 2e-3), (1e6, DVec3::new(1e6, 0.0, -3e6))] {
         let scene = closed_sphere(radius, centre, 0.5, Some(0.5), Vec::new());
-        for kind in [Path, Light] {
+        for kind in [Path, Light, Bdpt, Mmlt] {
             let what = format!("{kind:?} at radius {radius}");
             assert_mean(&render(&scene, kind, (20, 20), 160, -1, 1), 1.0, 0.03, &what);
             assert_mean(&render(&scene, kind, (20, 20), 160, 3, 2), 0.5 + 0.25 + 0.125, 0.03, &what);
@@ -44,7 +46,7 @@ fn a_point_light_in_a_closed_sphere_is_the_geometric_series() {
     // The point at the centre sends I / r^2 to every point: albedo / pi * I / r^2 / (1 - albedo).
     let intensity = Rgb::splat(std::f32::consts::PI);
     let scene = closed_sphere(1.0, DVec3::ZERO, 0.5, None, vec![LightDesc::Point { position: DVec3::ZERO, intensity }]);
-    for kind in [Path, Light] {
+    for kind in [Path, Light, Bdpt, Mmlt] {
         assert_mean(&render(&scene, kind, (20, 20), 160, -1, 1), 1.0, 0.03, &format!("{kind:?}"));
         assert_mean(&render(&scene, kind, (20, 20), 160, 2, 1), 0.5, 0.02, &format!("{kind:?}, direct light"));
     }
@@ -72,7 +74,7 @@ fn white_things_vanish_in_a_white_sky() {
         camera: camera(DVec3::new(0.2, 0.5, 5.0), DVec3::ZERO, 35.0),
         ..Default::default()
     });
-    for kind in [Path, Light] {
+    for kind in [Path, Light, Bdpt, Mmlt] {
         assert_mean(&render(&scene, kind, (20, 20), 512, -1, 1), 1.0, 0.03, &format!("{kind:?}"));
     }
 }
@@ -130,28 +132,31 @@ fn room(lens: f64) -> Scene {
 }
 
 #[test]
-fn light_tracing_and_path_tracing_make_the_same_image() {
+fn all_integrators_make_the_same_image() {
     for (lens, what) in [(0.0, "pinhole"), (0.08, "thin lens")] {
         let scene = room(lens);
-        let mut settings = RenderSettings::resolve(
-            &RenderOptions { spp: Some(512), size: Some((40, 40)), max_depth: Some(6), ..Default::default() },
-            &scene.defaults,
-        )
-        .unwrap();
-        // A wide filter: tiles sample it, splats spread over it.
-        settings.filter = renderer::scene::desc::FilterDesc::BlackmanHarris { radius: 1.5 };
-        let path = render_with(&scene, &settings, 2);
-        settings.integrator = Light;
-        settings.replicates = 16;
-        let light = render_with(&scene, &settings, 2);
-        assert_same_mean(&path, &light, 0.02, what);
-        // Pixel by pixel: at most a share of pixels that chance explains lies beyond its 99.9 % interval.
-        let t = common::t999(8);
-        let outside = (0..path.mean.len()).filter(|&i| {
-            let se = (renderer::math::sqr(path.std_error[i][1]) + renderer::math::sqr(light.std_error[i][1])).sqrt();
-            f64::from((path.mean[i][1] - light.mean[i][1]).abs()) > t * f64::from(se)
-        });
-        let outside = outside.count();
-        assert!(outside <= 20, "{what}: {outside} of {} pixels", path.mean.len());
+        let settings = |kind: IntegratorKind, n: u32| {
+            let options =
+                RenderOptions { size: Some((40, 40)), max_depth: Some(6), ..RenderOptions::counting(kind, n) };
+            let mut settings = RenderSettings::resolve(&options, &scene.defaults).unwrap();
+            // A wide filter: tiles sample it, splats spread over it.
+            settings.filter = renderer::scene::desc::FilterDesc::BlackmanHarris { radius: 1.5 };
+            settings
+        };
+        let path = render_with(&scene, &settings(Path, 512), 2);
+        for (kind, n) in [(Light, 512), (Bdpt, 256), (Mmlt, 1024)] {
+            let what = format!("{kind:?}, {what}");
+            let other = render_with(&scene, &settings(kind, n), 2);
+            assert_same_mean(&path, &other, 0.02, &what);
+            // Pixel by pixel: at most a share of pixels that chance explains lies beyond its 99.9 % interval.
+            let t = common::t999(8);
+            let outside = (0..path.mean.len()).filter(|&i| {
+                let se = |image: &MergedImage| renderer::math::sqr(image.std_error[i][1]);
+                let se = (se(&path) + se(&other)).sqrt();
+                f64::from((path.mean[i][1] - other.mean[i][1]).abs()) > t * f64::from(se)
+            });
+            let outside = outside.count();
+            assert!(outside <= 20, "{what}: {outside} of {} pixels", path.mean.len());
+        }
     }
 }

@@ -4,38 +4,57 @@
 
 use renderer::film::{Aov, Counters, SplatSums, TileSums};
 use renderer::integrator::IntegratorKind;
-use renderer::job::{Merger, PassPlan, Planner, RenderOptions, RenderSettings, Unit, UnitKind, UnitResult};
+use renderer::integrator::mmlt::{BootstrapSums, ChainStats};
+use renderer::job::{Merger, PassPlan, Planner, RenderOptions, RenderSettings, Sampling, Unit, UnitKind, UnitResult};
 use renderer::scene::desc::RenderDefaults;
 use renderer::spectrum::Rgb;
 
 fn settings(integrator: IntegratorKind, size: (u32, u32), spp: u32) -> RenderSettings {
-    let options =
-        RenderOptions { integrator: Some(integrator), size: Some(size), spp: Some(spp), ..Default::default() };
+    let options = RenderOptions { size: Some(size), ..RenderOptions::counting(integrator, spp) };
     RenderSettings::resolve(&options, &RenderDefaults::default()).unwrap()
+}
+
+fn splats(plan: &PassPlan, unit: &Unit) -> SplatSums {
+    let mut splats = SplatSums::new(plan.width, plan.height);
+    for i in 0..500u32 {
+        let h = (unit.id + 1).wrapping_mul(2_654_435_761).wrapping_add(i.wrapping_mul(40_503));
+        splats.add(h % plan.width, (h >> 16) % plan.height, Rgb::splat((h % 977) as f32 / 97.0));
+    }
+    splats.round();
+    splats
 }
 
 /// A result with numbers that depend on the unit alone.
 fn made_up(plan: &PassPlan, unit: &Unit) -> UnitResult {
     let value = |i: usize| ((u64::from(unit.id) * 7919 + i as u64 * 104_729) % 10_007) as f32 / 977.0;
     let counters = Counters { samples: 10 + u64::from(unit.id), rays: 20, non_finite: 0, negative: 0 };
-    let mut result = UnitResult { tile: None, splats: None, paths: 0, light_sums: Vec::new(), counters };
+    let mut result = UnitResult { counters, ..UnitResult::default() };
     match unit.kind {
         UnitKind::Tile { rect, start, end } => {
             let sums = (0..rect.area()).map(|i| Rgb::new(value(i), value(i + 1), 1.0 / 3.0)).collect();
             let aov = |i: usize| Aov { depth: value(i), hits: 1.0, ..Aov::default() };
             let aovs = if unit.replicate == 0 { (0..rect.area()).map(aov).collect() } else { Vec::new() };
             result.tile = Some(TileSums { rect, samples: end - start, sums, aovs });
+            if plan.sampling == Sampling::SplattingTiles {
+                result.splats = Some(splats(plan, unit));
+                result.paths = rect.area() as u64 * u64::from(end - start);
+            }
         }
         UnitKind::Paths { start, end } => {
-            let mut splats = SplatSums::new(plan.width, plan.height);
-            for i in 0..500u32 {
-                let h = (unit.id + 1).wrapping_mul(2_654_435_761).wrapping_add(i.wrapping_mul(40_503));
-                splats.add(h % plan.width, (h >> 16) % plan.height, Rgb::splat(value(i as usize)));
-            }
-            splats.round();
-            result.splats = Some(splats);
+            result.splats = Some(splats(plan, unit));
             result.paths = end - start;
             result.light_sums = vec![f64::from(value(3)), 1.0 / 7.0];
+        }
+        UnitKind::Bootstrap { edges, start, end } => {
+            let found: Vec<(u32, f32)> = (start..end).step_by(3).map(|i| (i, value(i as usize) + 0.1)).collect();
+            let techniques = (0..=edges).map(|s| f64::from(s) / 3.0).collect();
+            result.bootstrap = Some(BootstrapSums { found, techniques });
+            result.splats = (plan.pass == 0).then(|| splats(plan, unit));
+        }
+        UnitKind::Chains { first, end, .. } => {
+            result.splats = Some(splats(plan, unit));
+            let small = u64::from(end - first);
+            result.chains = Some(ChainStats { small, small_accepted: small / 2, large: 2, large_accepted: 1 });
         }
     }
     result
@@ -111,7 +130,7 @@ fn a_light_tracer_plans_its_second_pass_from_the_first() {
 
 #[test]
 fn bytes_give_back_the_same_result_and_the_same_bytes() {
-    for kind in [IntegratorKind::Path, IntegratorKind::Light] {
+    for (_, kind) in IntegratorKind::ALL.iter().copied() {
         let s = settings(kind, (100, 70), 40);
         let straight = run(&s, |_, _, result| result).image();
         let encoded = run(&s, |plan, unit, result| {
@@ -160,7 +179,7 @@ fn results_out_of_turn_or_of_another_unit_are_refused() {
 
 #[test]
 fn a_saved_merger_goes_on_with_the_same_bits() {
-    for kind in [IntegratorKind::Path, IntegratorKind::Light] {
+    for (_, kind) in IntegratorKind::ALL.iter().copied() {
         let s = settings(kind, (70, 50), 40);
         let whole = run(&s, |_, _, result| result);
         let mut merger = Merger::new(s);

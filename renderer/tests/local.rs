@@ -34,8 +34,8 @@ fn settings(scene: &Scene, options: RenderOptions) -> RenderSettings {
 #[test]
 fn the_number_of_threads_changes_no_bit() {
     let scene = scene();
-    for kind in [IntegratorKind::Path, IntegratorKind::Light] {
-        let s = settings(&scene, RenderOptions { integrator: Some(kind), spp: Some(40), ..Default::default() });
+    for (_, kind) in IntegratorKind::ALL.iter().copied() {
+        let s = settings(&scene, RenderOptions::counting(kind, 40));
         let images = [1, 2, 7].map(|threads| common::render_with(&scene, &s, threads));
         assert!(images[0].mean.iter().flatten().any(|v| *v > 0.0));
         assert!(images[0] == images[1] && images[0] == images[2], "{kind:?}");
@@ -48,8 +48,8 @@ fn the_number_of_threads_changes_no_bit() {
 #[test]
 fn an_interrupted_job_keeps_what_it_finished_and_is_right() {
     let scene = scene();
-    for kind in [IntegratorKind::Path, IntegratorKind::Light] {
-        let s = settings(&scene, RenderOptions { integrator: Some(kind), spp: Some(192), ..Default::default() });
+    for (_, kind) in IntegratorKind::ALL.iter().copied() {
+        let s = settings(&scene, RenderOptions::counting(kind, 192));
         let whole = common::render_with(&scene, &s, 2);
         let stop = Stop::new();
         let options = LocalOptions { threads: 2 };

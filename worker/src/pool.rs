@@ -26,7 +26,7 @@ fn work(board: &Board, task: &Task) {
     let result = match run_unit(&task.context.scene, &d.settings, &d.plan, &task.unit, &task.stop) {
         Ok(result) => Some(Ok(result.encode().into())),
         Err(UnitError::Stopped) => None,
-        Err(e @ UnitError::Panicked { .. }) => {
+        Err(e @ (UnitError::Panicked { .. } | UnitError::Mismatch { .. })) => {
             tracing::error!("{e}");
             Some(Err(e.to_string()))
         }

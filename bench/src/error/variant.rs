@@ -80,11 +80,15 @@ impl Variant {
     /// The variant as options of a render. Whatever reaches an integrator from here goes through this function.
     pub fn render_options(&self, shared: Budget) -> Result<RenderOptions, String> {
         let budget = if self.budget.is_empty() { shared } else { self.budget };
-        if budget.mpp.is_some() {
-            return Err(format!("{}: no integrator here counts mutations per pixel; give spp or time", self.name));
+        let mut options = RenderOptions { integrator: Some(self.kind), time_s: budget.time_s, ..Default::default() };
+        if self.kind == IntegratorKind::Mmlt {
+            options.mpp = budget.mpp.or(budget.spp);
+            let text = |t: &Tuning| t.value.as_ref().map_or(t.key.clone(), |v| format!("{}={v}", t.key));
+            let tuning: Vec<String> = self.tuning.iter().map(text).collect();
+            options.mmlt = tuning.join(",").parse().map_err(|e| format!("{}: {e}", self.name))?;
+            return Ok(options);
         }
-        let options =
-            RenderOptions { integrator: Some(self.kind), spp: budget.spp, time_s: budget.time_s, ..Default::default() };
+        options.spp = budget.spp;
         match self.tuning.first() {
             Some(t) => Err(format!("{}: the integrator {} has no option {:?}", self.name, self.kind.name(), t.key)),
             None => Ok(options),

@@ -180,13 +180,17 @@ impl fmt::Display for Info {
             ),
         )?;
         let s = &self.settings;
-        let spp = s.budget.spp.map_or("-".into(), |n| n.to_string());
+        let budget = match (s.budget.spp, s.budget.mpp) {
+            (Some(n), _) => format!("{n} spp"),
+            (_, Some(n)) => format!("{n} mutations per pixel"),
+            _ => "-".into(),
+        };
         let depth = s.max_depth.map_or("unbounded".into(), |d| format!("at most {d}"));
         let integrator = s.integrator.name();
         line("film", format!("{} x {} pixels, {:?}", s.width, s.height, s.filter))?;
         line(
             "settings",
-            format!("{integrator}, {spp} spp in {} replicates, depth {depth}, seed {}", s.replicates, s.seed),
+            format!("{integrator}, {budget} in {} replicates, depth {depth}, seed {}", s.replicates, s.seed),
         )?;
         let scene = self.memory.resident_bytes.map_or("unknown".into(), mib);
         line("memory", format!("{scene} with the scene loaded; film {}", mib(self.memory.film_bytes)))?;

@@ -65,12 +65,12 @@ async fn next(parts: &mut Streaming<proto::OutcomePart>) -> Result<Option<proto:
 /// The longest encoding of a unit's result: all its numbers, LZ4's worst case, and the head.
 fn longest(unit: &Unit, e: &Expected) -> u64 {
     let (w, h) = (e.settings.width, e.settings.height);
+    let blocks = u64::from(w.div_ceil(BLOCK)) * u64::from(h.div_ceil(BLOCK));
+    let film = blocks * u64::from(BLOCK * BLOCK * 3 + 1);
     let floats = match &unit.kind {
-        UnitKind::Tile { rect, .. } => rect.area() as u64 * (3 + size_of::<Aov>() as u64 / 4),
-        UnitKind::Paths { .. } => {
-            let blocks = u64::from(w.div_ceil(BLOCK)) * u64::from(h.div_ceil(BLOCK));
-            blocks * u64::from(BLOCK * BLOCK * 3 + 1)
-        }
+        UnitKind::Tile { rect, .. } => film + rect.area() as u64 * (3 + size_of::<Aov>() as u64 / 4),
+        UnitKind::Paths { .. } | UnitKind::Chains { .. } => film,
+        UnitKind::Bootstrap { edges, start, end } => film + 2 * u64::from(end - start) + 2 * u64::from(*edges) + 2,
     };
     1024 + 8 * u64::from(e.lights) + 4 * floats + 4 * floats / 250
 }

@@ -8,7 +8,7 @@ use uuid::Uuid;
 fn spec() -> JobSpec {
     let settings = RenderSettings {
         integrator: renderer::integrator::IntegratorKind::Path,
-        budget: Budget { spp: Some(4), time_s: None, target_error: None },
+        budget: Budget { spp: Some(4), ..Budget::default() },
         width: 8,
         height: 8,
         filter: FilterDesc::Box { radius: 0.5 },
@@ -16,6 +16,7 @@ fn spec() -> JobSpec {
         rr_depth: 5,
         seed: 1,
         replicates: 2,
+        mmlt: Default::default(),
     };
     JobSpec {
         name: "scene".into(),

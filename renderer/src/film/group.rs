@@ -15,8 +15,10 @@ pub enum GroupFilm {
         samples: Vec<u32>,
         /// Sums of splats.
         splats: Vec<[f64; 3]>,
-        /// Light paths behind `splats`: what a splat sum is divided by.
-        paths: u64,
+        /// What a splat sum is divided by: light paths, or the weight of the passes of chains.
+        splat_weight: f64,
+        /// Without splats the group is not complete, and counts for nothing.
+        awaits_splats: bool,
     },
     /// Complete.
     Closed {
@@ -30,7 +32,13 @@ pub enum GroupFilm {
 impl GroupFilm {
     fn open(&mut self, pixels: usize, tiles: bool, splat: bool) {
         if matches!(self, Self::Empty) {
-            *self = Self::Open { sums: Vec::new(), samples: Vec::new(), splats: Vec::new(), paths: 0 };
+            *self = Self::Open {
+                sums: Vec::new(),
+                samples: Vec::new(),
+                splats: Vec::new(),
+                splat_weight: 0.0,
+                awaits_splats: false,
+            };
         }
         if let Self::Open { sums, samples, splats, .. } = self {
             if tiles && sums.is_empty() {
@@ -61,14 +69,46 @@ impl GroupFilm {
         let (width, height) = layer.size();
         let pixels = width as usize * height as usize;
         self.open(pixels, false, true);
-        let Self::Open { splats, paths: total, .. } = self else { return };
+        let Self::Open { splats, splat_weight, .. } = self else { return };
         for (x, y, v) in layer.pixels() {
             let to = &mut splats[y as usize * width as usize + x as usize];
             for c in 0..3 {
                 to[c] += v[c];
             }
         }
-        *total += paths;
+        *splat_weight += paths as f64;
+    }
+
+    /// From now on the group counts for nothing until [`GroupFilm::add_chains`] completes it.
+    pub fn await_chains(&mut self, pixels: usize) {
+        self.open(pixels, true, true);
+        if let Self::Open { awaits_splats, .. } = self {
+            *awaits_splats = true;
+        }
+    }
+
+    /// Adds a complete estimate of what chains carry, with its weight among those of other passes.
+    pub fn add_chains(&mut self, radiance: &[[f64; 3]], pixels: usize, weight: f64) {
+        self.open(pixels, true, true);
+        let Self::Open { splats, splat_weight, awaits_splats, .. } = self else { return };
+        for (to, from) in splats.iter_mut().zip(radiance) {
+            for c in 0..3 {
+                to[c] += weight * from[c];
+            }
+        }
+        *splat_weight += weight;
+        *awaits_splats = false;
+    }
+
+    /// Puts a picture in place of what chains made: for previews.
+    pub fn replace_chains(&mut self, radiance: &[[f64; 3]], pixels: usize) {
+        self.open(pixels, true, true);
+        if let Self::Open { splats, splat_weight, awaits_splats, .. } = self {
+            splats.clear();
+            splats.extend_from_slice(radiance);
+            splats.resize(pixels, [0.0; 3]);
+            (*splat_weight, *awaits_splats) = (1.0, false);
+        }
     }
 
     /// The mean of pixel `i` and its weight (samples, or light paths per pixel); weight 0 where nothing was sampled.
@@ -76,19 +116,20 @@ impl GroupFilm {
         match self {
             Self::Empty => ([0.0; 3], 0.0),
             Self::Closed { mean, weight } => (mean[i].map(f64::from), *weight),
-            Self::Open { sums, samples, splats, paths } => {
+            Self::Open { awaits_splats: true, .. } => ([0.0; 3], 0.0),
+            Self::Open { sums, samples, splats, splat_weight, .. } => {
                 let n = samples.get(i).copied().map_or(0.0, f64::from);
                 let mut mean = [0.0; 3];
                 if n > 0.0 {
                     mean = sums[i].map(|v| v / n);
                 }
-                if *paths > 0 {
+                if *splat_weight > 0.0 {
                     for c in 0..3 {
-                        mean[c] += splats[i][c] / *paths as f64;
+                        mean[c] += splats[i][c] / splat_weight;
                     }
                 }
                 // Where tiles and splats sample the same image together, the tile's count leads.
-                (mean, if samples.is_empty() { *paths as f64 / splats.len() as f64 } else { n })
+                (mean, if samples.is_empty() { splat_weight / splats.len() as f64 } else { n })
             }
         }
     }
@@ -113,12 +154,13 @@ impl GroupFilm {
         }
         match self {
             Self::Empty => out.push(0),
-            Self::Open { sums, samples, splats, paths } => {
+            Self::Open { sums, samples, splats, splat_weight, awaits_splats } => {
                 out.push(1);
                 array(out, sums);
                 array(out, samples);
                 array(out, splats);
-                out.extend(paths.to_le_bytes());
+                out.extend(splat_weight.to_le_bytes());
+                out.push(u8::from(*awaits_splats));
             }
             Self::Closed { mean, weight } => {
                 out.push(2);
@@ -149,7 +191,8 @@ impl GroupFilm {
                 sums: array(bytes, pixels)?,
                 samples: array(bytes, pixels)?,
                 splats: array(bytes, pixels)?,
-                paths: word(bytes)?,
+                splat_weight: f64::from_bits(word(bytes)?),
+                awaits_splats: take(bytes, 1)? == [1],
             },
             [2] => Self::Closed {
                 mean: array(bytes, pixels).filter(|m: &Vec<_>| m.len() == pixels)?,

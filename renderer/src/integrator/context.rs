@@ -25,6 +25,26 @@ impl View {
     }
 }
 
+/// The path lengths that ordinary samples carry: short ones, and those longer than what chains carry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Carried {
+    /// Edges of the longest of the short ones.
+    pub up_to: u32,
+    /// Longer than this again.
+    pub beyond: u32,
+}
+
+impl Carried {
+    /// All lengths.
+    pub const ALL: Self = Self { up_to: u32::MAX, beyond: u32::MAX };
+
+    /// Whether paths of so many edges are carried.
+    #[inline]
+    pub fn has(self, edges: u32) -> bool {
+        edges <= self.up_to || edges > self.beyond
+    }
+}
+
 /// What every unit of an integrator needs.
 pub struct UnitContext<'a> {
     /// The scene.
@@ -37,8 +57,12 @@ pub struct UnitContext<'a> {
     pub replicate: u32,
     /// Edges of the longest path.
     pub max_depth: u32,
+    /// The path lengths that count.
+    pub carried: Carried,
     /// Edges from which Russian roulette may end a path.
     pub rr_depth: u32,
+    /// Contributions of connections below this are tested for visibility by chance only; 0 = never.
+    pub threshold: f32,
     /// Chooses lights: by power, or as the plan says.
     pub selector: &'a LightSelector,
     /// Whether the unit should end without a result.

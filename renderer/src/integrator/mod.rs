@@ -1,10 +1,12 @@
 //! Integrators. One file and one line of [`IntegratorKind`] each.
 
+pub mod bdpt;
 mod context;
 pub mod light;
+pub mod mmlt;
 pub mod path;
 
-pub use context::{UnitContext, View};
+pub use context::{Carried, UnitContext, View};
 
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +35,10 @@ integrators! {
     Path = "path",
     /// Light tracing: paths from the lights, each vertex connected to the camera.
     Light = "light",
+    /// Bidirectional path tracing: all ways to join a walk from the camera and one from a light.
+    Bdpt = "bdpt",
+    /// Multiplexed Metropolis light transport: Markov chains over the paths of bidirectional path tracing.
+    Mmlt = "mmlt",
 }
 
 impl std::str::FromStr for IntegratorKind {

@@ -77,12 +77,16 @@ impl<S: Sampler> Walk<'_, '_, S> {
             self.sampler.start_vertex(edges);
             self.counters.rays += 1;
             let Some(hit) = scene.accel.intersect(&ray) else {
-                self.add(&mut total, beta, self.escaped(&ray, &arrival));
+                if self.c.carried.has(edges) {
+                    self.add(&mut total, beta, self.escaped(&ray, &arrival));
+                }
                 break;
             };
             let hit = scene.geometry.interaction(&ray, &hit);
             let wo = -ray.d;
-            self.add(&mut total, beta, self.emitted(&hit, wo, &arrival));
+            if self.c.carried.has(edges) {
+                self.add(&mut total, beta, self.emitted(&hit, wo, &arrival));
+            }
             let material = scene.objects[hit.object.0 as usize].material;
             let shading = ShadingPoint::new(&scene.materials, &scene.textures, material, &hit, wo);
             if edges == 1 {
@@ -93,7 +97,7 @@ impl<S: Sampler> Walk<'_, '_, S> {
             }
 
             // Connect to a light.
-            if !shading.is_delta_only() {
+            if !shading.is_delta_only() && self.c.carried.has(edges + 1) {
                 let direct = self.next_event(&hit, &shading);
                 self.add(&mut total, beta, direct);
             }
@@ -155,7 +159,7 @@ impl<S: Sampler> Walk<'_, '_, S> {
         if radiance.is_black() || arrival.alone {
             return radiance;
         }
-        let pdf_light = self.c.selector.pmf(index as usize) * light.pdf_li(&context, arrival.p, hit);
+        let pdf_light = self.c.selector.pmf(index as usize) * light.pdf_li(&context, arrival.p, &hit.anchor());
         radiance * power_heuristic(arrival.pdf, pdf_light)
     }
 

@@ -2,9 +2,11 @@
 
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Aov, BLOCK, Counters, SplatSums, TileSums};
+use crate::integrator::mmlt::{BootstrapSums, ChainStats};
 use crate::spectrum::Rgb;
 
-const MAGIC: &[u8; 4] = b"LFU1";
+const MAGIC: &[u8; 4] = b"LFU2";
+const BLOCK_FLOATS: usize = (BLOCK * BLOCK) as usize * 3;
 const AOV_FLOATS: usize = size_of::<Aov>() / 4;
 
 /// Bytes that are not the result of the unit asked for.
@@ -27,6 +29,7 @@ impl UnitResult {
         }
         head.extend((self.light_sums.len() as u32).to_le_bytes());
         self.light_sums.iter().for_each(|v| head.extend(v.to_le_bytes()));
+        encode_chains(self, &mut head);
         let mut blocks: Vec<u32> = Vec::new();
         let mut floats: Vec<f32> = Vec::new();
         if let Some(tile) = &self.tile {
@@ -64,6 +67,8 @@ impl UnitResult {
         if light_sums.iter().any(|v| !(v.is_finite() && *v >= 0.0)) {
             return Err(fail("a light's sum is not a finite, non-negative number"));
         }
+        let splats = r.take(1).ok_or(fail("too short"))? == [1];
+        let (bootstrap, chains) = decode_chains(&mut r, unit)?;
         let empty = SplatSums::new(width, height);
         let n = r.u32().ok_or(fail("too short"))? as usize;
         if n > empty.block_count() {
@@ -71,40 +76,90 @@ impl UnitResult {
         }
         let blocks = (0..n).map(|_| r.u32()).collect::<Option<Vec<_>>>().ok_or(fail("too short"))?;
         let count = r.u32().ok_or(fail("too short"))? as usize;
-        let floats = match &unit.kind {
-            UnitKind::Tile { rect, .. } => {
-                let with_aovs = if unit.replicate == 0 { 3 + AOV_FLOATS } else { 3 };
-                (blocks.is_empty() && count == rect.area() * with_aovs).then_some(count)
-            }
-            UnitKind::Paths { .. } => (count == n * (BLOCK * BLOCK) as usize * 3).then_some(count),
+        let of_tile = match &unit.kind {
+            UnitKind::Tile { rect, .. } => rect.area() * if unit.replicate == 0 { 3 + AOV_FLOATS } else { 3 },
+            UnitKind::Paths { .. } | UnitKind::Bootstrap { .. } | UnitKind::Chains { .. } => 0,
         };
-        let floats = floats.ok_or(fail("the number of sums does not fit the unit"))?;
-        let planes = lz4_flex::block::decompress(r.0, floats * 4).map_err(|_| fail("damaged compression"))?;
-        let floats = from_planes(&planes, floats).ok_or(fail("the number of sums does not fit the unit"))?;
+        if count != of_tile + n * BLOCK_FLOATS {
+            return Err(fail("the number of sums does not fit the unit"));
+        }
+        let planes = lz4_flex::block::decompress(r.0, count * 4).map_err(|_| fail("damaged compression"))?;
+        let floats = from_planes(&planes, count).ok_or(fail("the number of sums does not fit the unit"))?;
         if floats.iter().any(|v| !v.is_finite()) {
             return Err(fail("a sum is not finite"));
         }
-        let mut result = Self { tile: None, splats: None, paths, light_sums, counters };
-        match &unit.kind {
-            UnitKind::Tile { rect, start, end } => {
-                let (sums, aovs) = floats.split_at(rect.area() * 3);
-                let sums = sums.chunks_exact(3).map(|v| Rgb::new(v[0], v[1], v[2])).collect();
-                let aovs = aovs
-                    .chunks_exact(AOV_FLOATS)
-                    .map(|v| bytemuck::pod_read_unaligned(bytemuck::cast_slice(v)))
-                    .collect();
-                result.tile = Some(TileSums { rect: *rect, samples: end - start, sums, aovs });
+        let (tile, splatted) = floats.split_at(of_tile);
+        let mut result = Self { paths, light_sums, bootstrap, chains, counters, ..Self::default() };
+        if let UnitKind::Tile { rect, start, end } = &unit.kind {
+            let (sums, aovs) = tile.split_at(rect.area() * 3);
+            let sums = sums.chunks_exact(3).map(|v| Rgb::new(v[0], v[1], v[2])).collect();
+            let aovs =
+                aovs.chunks_exact(AOV_FLOATS).map(|v| bytemuck::pod_read_unaligned(bytemuck::cast_slice(v))).collect();
+            result.tile = Some(TileSums { rect: *rect, samples: end - start, sums, aovs });
+        }
+        if splats {
+            let mut splats = empty;
+            for (block, sums) in blocks.iter().zip(splatted.chunks_exact(BLOCK_FLOATS)) {
+                let sums: Vec<[f32; 3]> = sums.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
+                splats.set_block(*block, &sums).ok_or(fail("a splat block lies outside the film"))?;
             }
-            UnitKind::Paths { .. } => {
-                let mut splats = empty;
-                for (block, sums) in blocks.iter().zip(floats.chunks_exact((BLOCK * BLOCK) as usize * 3)) {
-                    let sums: Vec<[f32; 3]> = sums.chunks_exact(3).map(|v| [v[0], v[1], v[2]]).collect();
-                    splats.set_block(*block, &sums).ok_or(fail("a splat block lies outside the film"))?;
-                }
-                result.splats = Some(splats);
-            }
+            result.splats = Some(splats);
+        } else if n > 0 {
+            return Err(fail("splats where there are none"));
         }
         Ok(result)
+    }
+}
+
+/// What bootstrap and chain units have beside sums.
+fn encode_chains(result: &UnitResult, out: &mut Vec<u8>) {
+    out.push(u8::from(result.splats.is_some()));
+    if let Some(b) = &result.bootstrap {
+        out.extend((b.techniques.len() as u32).to_le_bytes());
+        b.techniques.iter().for_each(|v| out.extend(v.to_le_bytes()));
+        out.extend((b.found.len() as u32).to_le_bytes());
+        for (index, target) in &b.found {
+            out.extend(index.to_le_bytes());
+            out.extend(target.to_le_bytes());
+        }
+    }
+    if let Some(c) = &result.chains {
+        [c.small, c.small_accepted, c.large, c.large_accepted].iter().for_each(|v| out.extend(v.to_le_bytes()));
+    }
+}
+
+/// Reads what [`encode_chains`] wrote, for this unit.
+fn decode_chains(r: &mut Reader, unit: &Unit) -> Result<(Option<BootstrapSums>, Option<ChainStats>), DecodeError> {
+    let fail = |what| DecodeError { unit: unit.id, what };
+    let short = || fail("too short");
+    match unit.kind {
+        UnitKind::Tile { .. } | UnitKind::Paths { .. } => Ok((None, None)),
+        UnitKind::Chains { .. } => {
+            let mut next = || r.u64().ok_or_else(short);
+            let stats = ChainStats { small: next()?, small_accepted: next()?, large: next()?, large_accepted: next()? };
+            Ok((None, Some(stats)))
+        }
+        UnitKind::Bootstrap { edges, start, end } => {
+            let n = r.u32().ok_or_else(short)?;
+            if n != edges + 1 {
+                return Err(fail("the number of techniques does not fit the unit"));
+            }
+            let techniques =
+                (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>().ok_or_else(short)?;
+            let n = r.u32().ok_or_else(short)?;
+            if n > end - start {
+                return Err(fail("more paths found than there were samples"));
+            }
+            let found = (0..n).map(|_| Some((r.u32()?, f32::from_bits(r.u32()?)))).collect::<Option<Vec<_>>>();
+            let found = found.ok_or_else(short)?;
+            let fits =
+                |(index, target): &(u32, f32)| (start..end).contains(index) && *target > 0.0 && target.is_finite();
+            let sums_fit = techniques.iter().all(|v| v.is_finite() && *v >= 0.0);
+            if !found.iter().all(fits) || !found.is_sorted_by(|a, b| a.0 < b.0) || !sums_fit {
+                return Err(fail("a sample of the pool is out of range or out of order"));
+            }
+            Ok((Some(BootstrapSums { found, techniques }), None))
+        }
     }
 }
 

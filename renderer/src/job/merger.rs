@@ -1,7 +1,10 @@
-use super::plan::{PassPlan, Planner};
+use super::metropolis::Metropolis;
+use super::plan::{Learned, Part, PassPlan, Planner, Sampling};
 use super::settings::RenderSettings;
 use super::unit::{UnitKind, UnitResult};
-use crate::film::{Aov, Counters, GroupFilm, MergedImage};
+use crate::film::{Aov, Counters, GroupFilm, MergedImage, SplatSums};
+use crate::integrator::IntegratorKind;
+use crate::integrator::mmlt::ChainStats;
 
 /// A result that can't be folded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -21,6 +24,9 @@ pub enum FoldError {
     Mismatch(u32),
 }
 
+/// Contributions of a bidirectional connection below this share of the image's mean are left to chance.
+const CONNECTION_SHARE: f64 = 0.02;
+
 /// Folds unit results in the order of their numbers: sums of floats depend on their order, so there is just this one.
 #[derive(Clone, Debug)]
 pub struct Merger {
@@ -32,6 +38,9 @@ pub struct Merger {
     groups: Vec<GroupFilm>,
     aovs: Vec<Aov>,
     light_sums: Vec<f64>,
+    /// What a Metropolis job has learned.
+    metropolis: Metropolis,
+    chain_stats: ChainStats,
     counters: Counters,
     checkpoints_met: u32,
     finished: bool,
@@ -52,6 +61,8 @@ impl Merger {
             groups,
             aovs: Vec::new(),
             light_sums: Vec::new(),
+            metropolis: Metropolis::default(),
+            chain_stats: ChainStats::default(),
             counters: Counters::default(),
             checkpoints_met: 0,
             finished: false,
@@ -85,8 +96,16 @@ impl Merger {
         }
         self.fold_any(unit, result)?;
         self.next += 1;
-        if let Some(group) = self.plan.ends_group(unit).filter(|g| g.closes) {
-            self.groups[group.replicate as usize].close(self.settings.width as usize * self.settings.height as usize);
+        if let Some(&Part::Samples(part)) = self.plan.ends_part(unit) {
+            let group = &mut self.groups[part.replicate as usize];
+            let pixels = self.settings.width as usize * self.settings.height as usize;
+            if self.plan.chain_weight > 0 {
+                let radiance = std::mem::take(&mut self.metropolis.pending);
+                group.add_chains(&radiance, pixels, f64::from(self.plan.chain_weight));
+            }
+            if part.closes {
+                group.close(pixels);
+            }
         }
         Ok(())
     }
@@ -101,22 +120,40 @@ impl Merger {
         let (w, h) = (self.settings.width, self.settings.height);
         let unit = self.plan.unit(id).ok_or(FoldError::Mismatch(id))?;
         let group = &mut self.groups[unit.replicate as usize];
+        let fits = |splats: &SplatSums| splats.size() == (w, h);
         match (&unit.kind, &result.tile, &result.splats) {
-            (UnitKind::Tile { rect, start, end }, Some(tile), None)
-                if tile.rect == *rect && tile.samples == end - start && tile.sums.len() == rect.area() =>
+            (UnitKind::Tile { rect, start, end }, Some(tile), splats)
+                if tile.rect == *rect
+                    && tile.samples == end - start
+                    && tile.sums.len() == rect.area()
+                    && tile.aovs.len() == if unit.replicate == 0 { rect.area() } else { 0 }
+                    && splats.is_some() == (self.plan.sampling == Sampling::SplattingTiles)
+                    && splats.as_ref().is_none_or(fits) =>
             {
-                if tile.aovs.len() != if unit.replicate == 0 { rect.area() } else { 0 } {
-                    return Err(FoldError::Mismatch(id));
-                }
                 group.add_tile(w, h, tile);
+                if let Some(splats) = splats {
+                    group.add_splats(splats, rect.area() as u64 * u64::from(tile.samples));
+                }
                 self.add_aovs(tile);
             }
-            (UnitKind::Paths { start, end }, None, Some(splats))
-                if splats.size() == (w, h) && result.paths == end - start =>
-            {
+            (UnitKind::Paths { start, end }, None, Some(splats)) if fits(splats) && result.paths == end - start => {
                 group.add_splats(splats, result.paths);
                 self.light_sums.resize(self.light_sums.len().max(result.light_sums.len()), 0.0);
                 self.light_sums.iter_mut().zip(&result.light_sums).for_each(|(to, from)| *to += from);
+            }
+            (UnitKind::Bootstrap { edges, .. }, None, splats) if splats.as_ref().is_none_or(fits) => {
+                self.metropolis.add_bootstrap(&self.settings, &self.plan, id, *edges, result);
+            }
+            (UnitKind::Chains { part, .. }, None, Some(splats)) if fits(splats) => {
+                let Some(Part::Chains { b, starts, mutations, .. }) = self.plan.parts.get(*part as usize) else {
+                    return Err(FoldError::Mismatch(id));
+                };
+                group.await_chains(w as usize * h as usize);
+                let scale = f64::from(*b) / (starts.len() as f64 * f64::from(*mutations));
+                self.metropolis.add_chains(w, h, splats, scale);
+                if let Some(stats) = &result.chains {
+                    self.chain_stats.add(stats);
+                }
             }
             _ => return Err(FoldError::Mismatch(id)),
         }
@@ -147,8 +184,7 @@ impl Merger {
         }
         self.done_spp += self.plan.spp() as u32;
         let ends = time_up || self.plan.last || self.target_met();
-        let next =
-            if ends { None } else { self.planner.next(self.plan.pass + 1, self.done_spp, self.learned_weights()) };
+        let next = if ends { None } else { self.next_plan() };
         let Some(plan) = next else {
             self.finished = true;
             return None;
@@ -158,9 +194,32 @@ impl Merger {
         Some(&self.plan)
     }
 
+    fn next_plan(&mut self) -> Option<PassPlan> {
+        if self.settings.integrator == IntegratorKind::Mmlt {
+            let direct = |i: usize| self.groups[0].pixel(i).0;
+            return self.metropolis.next(&self.settings, &self.plan, self.done_spp, direct);
+        }
+        let learned = Learned { light_weights: self.learned_weights(), threshold: self.learned_threshold() };
+        self.planner.next(self.plan.pass + 1, self.done_spp, learned)
+    }
+
+    /// A small part of the image's mean: connections that carry less are left to chance.
+    fn learned_threshold(&self) -> f32 {
+        if self.settings.integrator != IntegratorKind::Bdpt {
+            return 0.0;
+        }
+        let mean = self.image().mean;
+        let sum: f64 = mean.iter().flatten().map(|v| f64::from(*v)).sum();
+        (CONNECTION_SHARE * sum / (3 * mean.len()).max(1) as f64) as f32
+    }
+
     /// A target is met when the error's upper bound is below it at two checkpoints (ends of passes) in a row.
     fn target_met(&mut self) -> bool {
         let Some(target) = self.settings.budget.target_error else { return false };
+        // Pilots and pools are no checkpoints.
+        if self.plan.spp() == 0 {
+            return false;
+        }
         let met = self.image().error.is_some_and(|e| e.upper95 <= target);
         self.checkpoints_met = if met { self.checkpoints_met + 1 } else { 0 };
         self.checkpoints_met >= 2
@@ -184,7 +243,8 @@ impl Merger {
     /// Share of the job's samples that are folded when the budget is in samples, else of the pass; 1 at the end.
     pub fn fraction(&self) -> f64 {
         let in_pass = f64::from(self.next) / f64::from(self.plan.unit_count().max(1));
-        match self.settings.budget.spp {
+        let b = &self.settings.budget;
+        match b.spp.or(b.mpp) {
             _ if self.finished => 1.0,
             Some(n) => (f64::from(self.done_spp) + self.plan.spp() as f64 * in_pass) / f64::from(n),
             None => in_pass,
@@ -203,13 +263,15 @@ impl Merger {
 
     /// The image so far.
     pub fn image(&self) -> MergedImage {
-        MergedImage::from_groups(
-            self.settings.width,
-            self.settings.height,
-            &self.groups,
-            self.aovs.clone(),
-            self.counters,
-        )
+        let (w, h) = (self.settings.width, self.settings.height);
+        let preview = (self.done_spp == 0).then(|| self.metropolis.preview(w, h, &self.groups)).flatten();
+        let groups = preview.as_ref().map_or(&self.groups[..], std::slice::from_ref);
+        MergedImage::from_groups(w, h, groups, self.aovs.clone(), self.counters)
+    }
+
+    /// How the mutations of a Metropolis job fared.
+    pub fn chain_stats(&self) -> ChainStats {
+        self.chain_stats
     }
 
     /// The whole state as bytes: a merger that is loaded from them goes on with the same bits.
@@ -220,6 +282,7 @@ impl Merger {
             next: self.next,
             done_spp: self.done_spp,
             light_sums: self.light_sums.iter().map(|v| v.to_bits()).collect(),
+            chain_stats: self.chain_stats,
             counters: self.counters,
             checkpoints_met: self.checkpoints_met,
             finished: self.finished,
@@ -231,6 +294,7 @@ impl Merger {
         out.extend((self.aovs.len() as u64).to_le_bytes());
         out.extend_from_slice(bytemuck::cast_slice(&self.aovs));
         self.groups.iter().for_each(|g| g.save(&mut out));
+        self.metropolis.save(&mut out);
         let digest = blake3::hash(&out);
         out.extend(digest.as_bytes());
         out
@@ -261,6 +325,7 @@ impl Merger {
         }
         let groups =
             (0..head.settings.replicates).map(|_| GroupFilm::load(&mut rest, pixels)).collect::<Option<_>>()?;
+        let metropolis = Metropolis::load(&mut rest, pixels)?;
         Some(Self {
             planner: Planner::new(head.settings.clone()),
             settings: head.settings,
@@ -270,6 +335,8 @@ impl Merger {
             groups,
             aovs,
             light_sums: head.light_sums.into_iter().map(f64::from_bits).collect(),
+            metropolis,
+            chain_stats: head.chain_stats,
             counters: head.counters,
             checkpoints_met: head.checkpoints_met,
             finished: head.finished,
@@ -285,6 +352,7 @@ struct Head {
     next: u32,
     done_spp: u32,
     light_sums: Vec<u64>,
+    chain_stats: ChainStats,
     counters: Counters,
     checkpoints_met: u32,
     finished: bool,

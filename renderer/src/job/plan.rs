@@ -1,12 +1,20 @@
+use super::metropolis;
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind};
 use crate::film::Rect;
 use crate::integrator::IntegratorKind;
+use crate::integrator::mmlt::{ChainConstants, ChainStart};
 use crate::scene::bundle::Digest;
 use serde::{Deserialize, Serialize};
 
 /// Samples (or light paths) that one unit aims at: some tens of milliseconds of work.
 const UNIT_SAMPLES: u64 = 1 << 16;
+/// Most samples of a pixel in a unit.
+const SAMPLE_CHUNK: u32 = 256;
+/// Bootstrap samples of a unit.
+const UNIT_BOOTSTRAP: u32 = 1 << 15;
+/// Mutations that a unit of chains aims at.
+const UNIT_MUTATIONS: u64 = 1 << 18;
 /// Most samples per pixel of a job.
 const MAX_SPP: u32 = 1 << 24;
 
@@ -24,8 +32,60 @@ pub struct GroupRange {
     pub closes: bool,
 }
 
+/// How samples of a [`GroupRange`] become units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Tiles, each writing its own pixels.
+    Tiles,
+    /// Tiles whose samples splat over the whole film as well.
+    SplattingTiles,
+    /// Light paths over the whole film.
+    Paths,
+}
+
+/// A part of a pass; its units follow from it by arithmetic.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Part {
+    /// Ordinary samples.
+    Samples(GroupRange),
+    /// Independent samples of one path length: the pool from which chains start.
+    Bootstrap {
+        /// The group.
+        replicate: u32,
+        /// Edges of the paths.
+        edges: u32,
+        /// Number of samples.
+        samples: u32,
+    },
+    /// Markov chains of one path length.
+    Chains {
+        /// The group.
+        replicate: u32,
+        /// Edges of the paths.
+        edges: u32,
+        /// Integral of the chains' target, as the pool estimates it.
+        b: f32,
+        /// Where the chains start.
+        starts: Vec<ChainStart>,
+        /// Mutations of each chain.
+        mutations: u32,
+    },
+}
+
+impl Part {
+    /// The group that it belongs to.
+    pub fn replicate(&self) -> u32 {
+        match self {
+            Self::Samples(g) => g.replicate,
+            Self::Bootstrap { replicate, .. } | Self::Chains { replicate, .. } => *replicate,
+        }
+    }
+}
+
 /// The plan of one pass: a pure function of the settings and of what the passes before it merged to. Its units follow from it by
-/// arithmetic, numbered from 0, group after group.
+/// arithmetic, numbered from 0, part after part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassPlan {
@@ -35,12 +95,18 @@ pub struct PassPlan {
     pub width: u32,
     /// Film height in pixels.
     pub height: u32,
-    /// Whether units are light paths over the whole film rather than tiles.
-    pub splats: bool,
-    /// What each group renders, in the order of the units.
-    pub groups: Vec<GroupRange>,
+    /// What units of samples are.
+    pub sampling: Sampling,
+    /// What is done, in the order of the units.
+    pub parts: Vec<Part>,
     /// Plan constant: selection weights of the lights, learned from earlier passes; empty = by power.
     pub light_weights: Vec<f32>,
+    /// Plan constant: contributions of connections below this are tested for visibility by chance only.
+    pub threshold: f32,
+    /// Plan constant of Metropolis jobs.
+    pub chains: Option<ChainConstants>,
+    /// Weight of the pass's chains among those of other passes; 0 when it has none.
+    pub chain_weight: u32,
     /// The job ends with this pass.
     pub last: bool,
 }
@@ -52,86 +118,134 @@ impl PassPlan {
         Digest::of(&serde_json::to_vec(self).unwrap_or_default())
     }
 
-    /// Samples per pixel of the pass.
+    /// Samples per pixel of the pass; of a Metropolis job, mutations per pixel.
     pub fn spp(&self) -> u64 {
-        self.groups.iter().map(|g| u64::from(g.end - g.start)).sum()
+        let mut samples = 0;
+        for part in &self.parts {
+            match part {
+                Part::Samples(g) => samples += u64::from(g.end - g.start),
+                Part::Bootstrap { .. } | Part::Chains { .. } => {}
+            }
+        }
+        if self.chains.is_some() { u64::from(self.chain_weight) } else { samples }
     }
 
     fn pixels(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
 
+    /// Samples that a unit aims at: more where its result is a whole film.
+    fn unit_samples(&self) -> u64 {
+        match self.sampling {
+            Sampling::Tiles => UNIT_SAMPLES,
+            Sampling::SplattingTiles | Sampling::Paths => UNIT_SAMPLES.max(self.pixels() / 4),
+        }
+    }
+
     /// Side of a tile: the fewer samples a pixel gets, the larger, so that units cost about the same.
     fn tile_side(&self) -> u32 {
-        let n = self.groups.iter().map(|g| g.end - g.start).max().unwrap_or(1).max(1);
-        [128u32, 64, 32].into_iter().find(|s| u64::from(s * s) * u64::from(n) <= UNIT_SAMPLES).unwrap_or(16)
+        let samples = |p: &Part| if let Part::Samples(g) = p { g.end - g.start } else { 0 };
+        let n = u64::from(self.parts.iter().map(samples).max().unwrap_or(1).clamp(1, SAMPLE_CHUNK));
+        let fits = |s: &u32| u64::from(s * s) * n <= self.unit_samples();
+        [1024u32, 512, 256, 128, 64, 32]
+            .into_iter()
+            .filter(|s| self.sampling != Sampling::Tiles || *s <= 128)
+            .find(fits)
+            .unwrap_or(16)
     }
 
-    /// Sample indices per unit: at most 256 of a pixel, so that long renders keep small units.
+    /// Sample indices per unit: so many of a pixel at most, so that long renders keep small units.
     fn sample_chunks(g: &GroupRange) -> u32 {
-        (g.end - g.start).div_ceil(256)
+        (g.end - g.start).div_ceil(SAMPLE_CHUNK)
     }
 
-    /// Paths per unit of a splatting integrator: more on large films, whose results are larger.
-    fn unit_paths(&self) -> u64 {
-        UNIT_SAMPLES.max(self.pixels() / 4)
+    /// Chains per unit: at least some tenths of a second of work, and more on large films, whose results are larger.
+    fn unit_chains(&self, mutations: u32) -> u32 {
+        let target = UNIT_MUTATIONS.max(2 * self.pixels());
+        u32::try_from(target.div_ceil(u64::from(mutations.max(1)))).unwrap_or(u32::MAX).max(1)
     }
 
-    fn units_of(&self, g: &GroupRange) -> u64 {
-        if self.splats {
-            (u64::from(g.end - g.start) * self.pixels()).div_ceil(self.unit_paths())
-        } else {
-            let side = self.tile_side();
-            u64::from(Self::sample_chunks(g))
-                * u64::from(self.width.div_ceil(side))
-                * u64::from(self.height.div_ceil(side))
+    fn units_of(&self, part: &Part) -> u64 {
+        match part {
+            Part::Samples(g) if self.sampling == Sampling::Paths => {
+                (u64::from(g.end - g.start) * self.pixels()).div_ceil(self.unit_samples())
+            }
+            Part::Samples(g) => {
+                let side = self.tile_side();
+                u64::from(Self::sample_chunks(g))
+                    * u64::from(self.width.div_ceil(side))
+                    * u64::from(self.height.div_ceil(side))
+            }
+            Part::Bootstrap { samples, .. } => u64::from(samples.div_ceil(UNIT_BOOTSTRAP)),
+            Part::Chains { starts, mutations, .. } => {
+                (starts.len() as u64).div_ceil(u64::from(self.unit_chains(*mutations)))
+            }
         }
     }
 
     /// Number of units.
     pub fn unit_count(&self) -> u32 {
-        u32::try_from(self.groups.iter().map(|g| self.units_of(g)).sum::<u64>()).unwrap_or(u32::MAX)
+        u32::try_from(self.parts.iter().map(|p| self.units_of(p)).sum::<u64>()).unwrap_or(u32::MAX)
     }
 
     /// Unit `id`; `None` past the last.
     pub fn unit(&self, id: u32) -> Option<Unit> {
         let mut i = u64::from(id);
-        for g in &self.groups {
-            let n = self.units_of(g);
+        for (number, part) in (0..).zip(&self.parts) {
+            let n = self.units_of(part);
             if i < n {
-                return Some(Unit { pass: self.pass, id, replicate: g.replicate, kind: self.unit_of_group(g, i) });
+                let kind = self.unit_of_part(number, part, i);
+                return Some(Unit { pass: self.pass, id, replicate: part.replicate(), kind });
             }
             i -= n;
         }
         None
     }
 
-    fn unit_of_group(&self, g: &GroupRange, i: u64) -> UnitKind {
-        if self.splats {
-            let (first, last) = (u64::from(g.start) * self.pixels(), u64::from(g.end) * self.pixels());
-            let start = first + i * self.unit_paths();
-            return UnitKind::Paths { start, end: (start + self.unit_paths()).min(last) };
+    fn unit_of_part(&self, number: u32, part: &Part, i: u64) -> UnitKind {
+        match part {
+            Part::Samples(g) if self.sampling == Sampling::Paths => {
+                let (first, last) = (u64::from(g.start) * self.pixels(), u64::from(g.end) * self.pixels());
+                let start = first + i * self.unit_samples();
+                UnitKind::Paths { start, end: (start + self.unit_samples()).min(last) }
+            }
+            Part::Samples(g) => {
+                let side = self.tile_side();
+                let (across, down) = (self.width.div_ceil(side), self.height.div_ceil(side));
+                let tiles = u64::from(across) * u64::from(down);
+                let (chunk, tile) = ((i / tiles) as u32, (i % tiles) as u32);
+                let (x0, y0) = (tile % across * side, tile / across * side);
+                let rect = Rect { x0, y0, x1: (x0 + side).min(self.width), y1: (y0 + side).min(self.height) };
+                let start = g.start + chunk * SAMPLE_CHUNK;
+                UnitKind::Tile { rect, start, end: (start + SAMPLE_CHUNK).min(g.end) }
+            }
+            Part::Bootstrap { edges, samples, .. } => {
+                let start = i as u32 * UNIT_BOOTSTRAP;
+                UnitKind::Bootstrap { edges: *edges, start, end: (start + UNIT_BOOTSTRAP).min(*samples) }
+            }
+            Part::Chains { starts, mutations, .. } => {
+                let chains = self.unit_chains(*mutations);
+                let first = i as u32 * chains;
+                UnitKind::Chains { part: number, first, end: (first + chains).min(starts.len() as u32) }
+            }
         }
-        let side = self.tile_side();
-        let (across, down) = (self.width.div_ceil(side), self.height.div_ceil(side));
-        let tiles = u64::from(across) * u64::from(down);
-        let (chunk, tile) = ((i / tiles) as u32, (i % tiles) as u32);
-        let (x0, y0) = (tile % across * side, tile / across * side);
-        let rect = Rect { x0, y0, x1: (x0 + side).min(self.width), y1: (y0 + side).min(self.height) };
-        let start = g.start + chunk * 256;
-        UnitKind::Tile { rect, start, end: (start + 256).min(g.end) }
     }
 
-    /// The group whose last unit of this pass is `id`.
-    pub fn ends_group(&self, id: u32) -> Option<&GroupRange> {
+    /// The part whose last unit is `id`.
+    pub fn ends_part(&self, id: u32) -> Option<&Part> {
         let mut end = 0;
-        for g in &self.groups {
-            end += self.units_of(g);
+        for part in &self.parts {
+            end += self.units_of(part);
             if u64::from(id) + 1 == end {
-                return Some(g);
+                return Some(part);
             }
         }
         None
+    }
+
+    /// Whether unit `id` is the last one of ordinary samples of a group: every pixel has samples then.
+    pub fn covers_film(&self, id: u32) -> bool {
+        matches!(self.ends_part(id), Some(Part::Samples(_)))
     }
 }
 
@@ -152,9 +266,14 @@ impl Planner {
     /// A budget in samples is worked off group after group, so that few films are open at once. Its first pass is one sample per pixel
     /// of the first group; a tracer from the lights, which learns from its pilot, does an eighth of its groups first.
     pub fn first(&self) -> PassPlan {
-        let Some(spp) = self.sample_budget() else { return self.pass(0, 0, self.settings.replicates, Vec::new()) };
+        if self.settings.integrator == IntegratorKind::Mmlt {
+            return metropolis::pilot(&self.settings);
+        }
+        let Some(spp) = self.sample_budget() else {
+            return self.pass(0, 0, self.settings.replicates, Learned::default());
+        };
         let groups = self.shares(spp);
-        let first = if self.splats() {
+        let first = if self.learns_first() {
             groups[..(groups.len() / 8).max(1)].to_vec()
         } else if groups[0].end > 1 {
             vec![GroupRange { end: 1, closes: false, ..groups[0] }]
@@ -162,28 +281,29 @@ impl Planner {
             groups.clone()
         };
         let last = first == groups;
-        self.plan(0, first, Vec::new(), last)
+        self.plan(0, first, Learned::default(), last)
     }
 
-    /// The pass after one that ended at `done` samples per pixel in all; `None` when the sample budget is used up.
-    pub fn next(&self, pass: u32, done: u32, light_weights: Vec<f32>) -> Option<PassPlan> {
+    /// The pass after one that ended at `done` samples per pixel in all; `None` when the sample budget is used up. Not for Metropolis
+    /// jobs, which `metropolis` plans.
+    pub fn next(&self, pass: u32, done: u32, learned: Learned) -> Option<PassPlan> {
         if let Some(spp) = self.sample_budget() {
             let groups = self.shares(spp);
-            let rest = if self.splats() {
+            let rest = if self.learns_first() {
                 groups[(groups.len() / 8).max(1)..].to_vec()
             } else {
                 let mut rest = groups;
                 rest[0].start = 1;
                 rest
             };
-            return (pass == 1).then(|| self.plan(pass, rest, light_weights, true));
+            return (pass == 1).then(|| self.plan(pass, rest, learned, true));
         }
         // A tenth of what is done, in whole samples per group: passes stay below a tenth of a time budget, and checkpoints are
         // declared before anything is measured.
         let g = self.settings.replicates;
         let left = self.settings.budget.spp.map_or(MAX_SPP, |n| n.min(MAX_SPP)).saturating_sub(done);
         let size = (done / 10 / g * g).max(g).min(left);
-        (size > 0).then(|| self.pass(pass, done, size, light_weights))
+        (size > 0).then(|| self.pass(pass, done, size, learned))
     }
 
     /// The samples per pixel of a job that nothing but their number ends.
@@ -192,8 +312,17 @@ impl Planner {
         b.spp.filter(|_| b.time_s.is_none() && b.target_error.is_none())
     }
 
-    fn splats(&self) -> bool {
+    /// Whether the first pass is a pilot of whole groups.
+    fn learns_first(&self) -> bool {
         self.settings.integrator == IntegratorKind::Light
+    }
+
+    fn sampling(&self) -> Sampling {
+        match self.settings.integrator {
+            IntegratorKind::Light => Sampling::Paths,
+            IntegratorKind::Bdpt => Sampling::SplattingTiles,
+            IntegratorKind::Path | IntegratorKind::Mmlt => Sampling::Tiles,
+        }
     }
 
     /// What each group renders of a whole sample budget.
@@ -206,7 +335,7 @@ impl Planner {
     }
 
     /// Samples `from .. from + size` of the job, dealt to the groups as evenly as can be.
-    fn pass(&self, pass: u32, from: u32, size: u32, light_weights: Vec<f32>) -> PassPlan {
+    fn pass(&self, pass: u32, from: u32, size: u32, learned: Learned) -> PassPlan {
         let g = self.settings.replicates;
         let upto = |total: u32, r: u32| total / g + u32::from(r < total % g);
         let groups = (0..g)
@@ -214,11 +343,30 @@ impl Planner {
             .filter(|r| r.end > r.start)
             .collect();
         let last = self.settings.budget.spp.is_some_and(|n| from + size >= n);
-        self.plan(pass, groups, light_weights, last)
+        self.plan(pass, groups, learned, last)
     }
 
-    fn plan(&self, pass: u32, groups: Vec<GroupRange>, light_weights: Vec<f32>, last: bool) -> PassPlan {
-        let (width, height) = (self.settings.width, self.settings.height);
-        PassPlan { pass, width, height, splats: self.splats(), groups, light_weights, last }
+    fn plan(&self, pass: u32, groups: Vec<GroupRange>, learned: Learned, last: bool) -> PassPlan {
+        PassPlan {
+            pass,
+            width: self.settings.width,
+            height: self.settings.height,
+            sampling: self.sampling(),
+            parts: groups.into_iter().map(Part::Samples).collect(),
+            light_weights: learned.light_weights,
+            threshold: learned.threshold,
+            chains: None,
+            chain_weight: 0,
+            last,
+        }
     }
+}
+
+/// What earlier passes teach the next.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Learned {
+    /// Selection weights of the lights; empty = by power.
+    pub light_weights: Vec<f32>,
+    /// Contributions of connections below this are tested for visibility by chance only.
+    pub threshold: f32,
 }

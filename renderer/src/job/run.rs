@@ -1,10 +1,13 @@
-use super::plan::PassPlan;
+use super::metropolis::{self, DIRECT_EDGES};
+use super::plan::{Part, PassPlan, Sampling};
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind, UnitResult};
-use crate::film::SplatSums;
-use crate::integrator::{self, UnitContext, View};
+use crate::film::{Rect, SplatSums};
+use crate::integrator::mmlt::{self, ChainTask, Mismatch};
+use crate::integrator::{self, Carried, IntegratorKind, UnitContext, View};
 use crate::light::LightSelector;
 use crate::scene::Scene;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -34,11 +37,21 @@ impl Stop {
 }
 
 /// Why a unit has no result.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UnitError {
     /// It was asked to stop.
     #[error("stopped")]
     Stopped,
+    /// What it was given does not agree with what it finds.
+    #[error("unit {unit} of pass {pass} can't be run: {source}")]
+    Mismatch {
+        /// The pass.
+        pass: u32,
+        /// The unit.
+        unit: u32,
+        /// What differs.
+        source: Mismatch,
+    },
     /// It panicked: a fault of the renderer.
     #[error("unit {unit} of pass {pass} failed: {message}")]
     Panicked {
@@ -60,7 +73,7 @@ pub fn run_unit(
     stop: &Stop,
 ) -> Result<UnitResult, UnitError> {
     match catch_unwind(AssertUnwindSafe(|| run(scene, settings, plan, unit, stop))) {
-        Ok(result) => result.ok_or(UnitError::Stopped),
+        Ok(result) => result?.ok_or(UnitError::Stopped),
         Err(payload) => {
             let text = payload.downcast_ref::<String>().map(String::as_str).or(payload.downcast_ref::<&str>().copied());
             let message = text.unwrap_or("a panic without a message").to_string();
@@ -69,34 +82,101 @@ pub fn run_unit(
     }
 }
 
-fn run(scene: &Scene, settings: &RenderSettings, plan: &PassPlan, unit: &Unit, stop: &Stop) -> Option<UnitResult> {
-    let view = View::new(scene, settings.width, settings.height, settings.filter)?;
+fn run(
+    scene: &Scene,
+    settings: &RenderSettings,
+    plan: &PassPlan,
+    unit: &Unit,
+    stop: &Stop,
+) -> Result<Option<UnitResult>, UnitError> {
+    let Some(view) = View::new(scene, settings.width, settings.height, settings.filter) else { return Ok(None) };
     let learned = (plan.light_weights.len() == scene.lights.len() && !scene.lights.is_empty())
         .then(|| LightSelector::defensive(&plan.light_weights, UNIFORM_SHARE));
+    let (max_depth, carried) = depths(settings);
     let context = UnitContext {
         scene,
         view: &view,
         seed: settings.seed,
         replicate: unit.replicate,
-        max_depth: settings.max_depth.unwrap_or(u32::MAX),
+        max_depth,
+        carried,
         rr_depth: settings.rr_depth,
+        threshold: plan.threshold,
         selector: learned.as_ref().unwrap_or(&scene.selector),
         stopped: &|| stop.stopped(),
     };
-    let mut result =
-        UnitResult { tile: None, splats: None, paths: 0, light_sums: Vec::new(), counters: Default::default() };
-    match unit.kind {
-        UnitKind::Tile { rect, start, end } => {
-            result.tile = Some(integrator::path::render_tile(&context, rect, start..end, &mut result.counters)?);
-        }
+    let mut result = UnitResult::default();
+    let done = match unit.kind {
+        UnitKind::Tile { rect, start, end } => run_tile(&context, plan, rect, start..end, &mut result),
         UnitKind::Paths { start, end } => {
             let mut splats = SplatSums::new(settings.width, settings.height);
-            result.light_sums =
-                integrator::light::trace_paths(&context, start..end, &mut splats, &mut result.counters)?;
-            splats.round();
-            result.splats = Some(splats);
+            let sums = integrator::light::trace_paths(&context, start..end, &mut splats, &mut result.counters);
+            result.light_sums = sums.unwrap_or_default();
             result.paths = end - start;
+            result.splats = Some(splats);
+            !(context.stopped)()
         }
+        UnitKind::Bootstrap { edges, start, end } => {
+            let Some(constants) = &plan.chains else { return Ok(None) };
+            // The pilot's samples are a preview.
+            let mut splats = (plan.pass == 0).then(|| SplatSums::new(settings.width, settings.height));
+            let (splat, counters) = (splats.as_mut(), &mut result.counters);
+            let at = (plan.pass, edges);
+            result.bootstrap =
+                mmlt::run_bootstrap(&context, constants, &settings.mmlt, at, start..end, splat, counters);
+            result.splats = splats;
+            result.bootstrap.is_some()
+        }
+        UnitKind::Chains { part, first, end } => {
+            let (Some(constants), Some(Part::Chains { edges, b, starts, mutations, .. })) =
+                (&plan.chains, plan.parts.get(part as usize))
+            else {
+                return Ok(None);
+            };
+            let Some(starts) = starts.get(first as usize..end as usize) else { return Ok(None) };
+            let task = ChainTask {
+                pool: plan.pass.saturating_sub(1),
+                edges: *edges,
+                first,
+                starts,
+                mutations: *mutations,
+                b: *b,
+            };
+            let mut splats = SplatSums::new(settings.width, settings.height);
+            let (splat, counters) = (&mut splats, &mut result.counters);
+            result.chains = mmlt::run_chains(&context, constants, &settings.mmlt, plan.pass, &task, splat, counters)
+                .map_err(|source| UnitError::Mismatch { pass: unit.pass, unit: unit.id, source })?;
+            result.splats = Some(splats);
+            result.chains.is_some()
+        }
+    };
+    if let Some(splats) = &mut result.splats {
+        splats.round();
     }
-    Some(result)
+    Ok(done.then_some(result))
+}
+
+/// A tile of the job's ordinary samples.
+fn run_tile(c: &UnitContext<'_>, plan: &PassPlan, rect: Rect, samples: Range<u32>, result: &mut UnitResult) -> bool {
+    if plan.sampling == Sampling::SplattingTiles {
+        let mut splats = SplatSums::new(c.view.width, c.view.height);
+        result.paths = rect.area() as u64 * u64::from(samples.end - samples.start);
+        result.tile = integrator::bdpt::render_tile(c, rect, samples, &mut splats, &mut result.counters);
+        result.splats = Some(splats);
+    } else {
+        result.tile = integrator::path::render_tile(c, rect, samples, &mut result.counters);
+    }
+    result.tile.is_some()
+}
+
+/// Edges of the longest path, and which lengths ordinary samples carry.
+fn depths(settings: &RenderSettings) -> (u32, Carried) {
+    let all = settings.max_depth.unwrap_or(u32::MAX);
+    if settings.integrator != IntegratorKind::Mmlt {
+        return (all, Carried::ALL);
+    }
+    let longest = *metropolis::lengths(settings).end();
+    let carried = Carried { up_to: DIRECT_EDGES, beyond: longest.max(DIRECT_EDGES) };
+    // Where chains carry all that is longer, ordinary walks end early.
+    (if all <= longest { all.min(DIRECT_EDGES) } else { all }, carried)
 }

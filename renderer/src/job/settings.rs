@@ -1,5 +1,6 @@
 use crate::film::exr::Provenance;
 use crate::integrator::IntegratorKind;
+use crate::integrator::mmlt::MmltOptions;
 use crate::scene::bundle::Digest;
 use crate::scene::desc::{FilterDesc, RenderDefaults};
 use serde::{Deserialize, Serialize};
@@ -10,6 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Budget {
     /// Samples per pixel (light paths per pixel), all groups together.
     pub spp: Option<u32>,
+    /// Mutations per pixel, all groups together: what a Metropolis job has for samples.
+    pub mpp: Option<u32>,
     /// Wall time in seconds; the job ends with the pass in which it runs out.
     pub time_s: Option<f64>,
     /// Relative error whose upper 95 % bound must be met at two checkpoints in a row.
@@ -38,6 +41,8 @@ pub struct RenderSettings {
     pub seed: u64,
     /// Independent replicate groups.
     pub replicates: u32,
+    /// How chains run.
+    pub mmlt: MmltOptions,
 }
 
 /// What the command line says; `None` leaves it to the scene file or the default.
@@ -47,6 +52,10 @@ pub struct RenderOptions {
     pub integrator: Option<IntegratorKind>,
     /// `--spp`
     pub spp: Option<u32>,
+    /// `--mpp`
+    pub mpp: Option<u32>,
+    /// `--mmlt`
+    pub mmlt: MmltOptions,
     /// `--time`, seconds
     pub time_s: Option<f64>,
     /// `--target-error`
@@ -57,6 +66,15 @@ pub struct RenderOptions {
     pub max_depth: Option<i32>,
     /// `--seed`
     pub seed: Option<u64>,
+}
+
+impl RenderOptions {
+    /// An integrator with a budget of `n` samples per pixel, or mutations, if it makes those.
+    pub fn counting(integrator: IntegratorKind, n: u32) -> Self {
+        let chains = integrator == IntegratorKind::Mmlt;
+        let (spp, mpp) = if chains { (None, Some(n)) } else { (Some(n), None) };
+        Self { integrator: Some(integrator), spp, mpp, ..Self::default() }
+    }
 }
 
 /// Settings that can't be rendered.
@@ -79,23 +97,21 @@ impl RenderSettings {
             Some(k) => k,
             None => from_scene().transpose().map_err(SettingsError)?.unwrap_or(IntegratorKind::Path),
         };
-        let spp = match (options.spp, options.time_s, options.target_error) {
-            (None, None, None) => Some(scene.spp.unwrap_or(64)),
-            (spp, _, _) => spp,
-        };
+        let budget = budget(options, scene, integrator);
         let (width, height) = options.size.or(scene.size).unwrap_or((768, 432));
         let depth = options.max_depth.or(scene.max_depth).unwrap_or(-1);
-        let groups = if integrator == IntegratorKind::Light { SPLAT_REPLICATES } else { REPLICATES };
+        let groups = if integrator == IntegratorKind::Path { REPLICATES } else { SPLAT_REPLICATES };
         let settings = Self {
             integrator,
-            budget: Budget { spp, time_s: options.time_s, target_error: options.target_error },
+            budget,
             width,
             height,
             filter: scene.filter.unwrap_or(FilterDesc::Gaussian { stddev: 0.5 }),
             max_depth: if depth == -1 { None } else { Some(u32::try_from(depth).map_err(|_| bad_depth(depth))?) },
             rr_depth: scene.rr_depth.unwrap_or(5),
             seed: options.seed.or(scene.seed).unwrap_or(0),
-            replicates: spp.map_or(groups, |n| groups.min(n.max(1))),
+            replicates: budget.spp.map_or(groups, |n| groups.min(n.max(1))),
+            mmlt: options.mmlt,
         };
         settings.validate()?;
         Ok(settings)
@@ -118,11 +134,29 @@ impl RenderSettings {
             ));
         }
         let b = &self.budget;
-        if b.spp.is_none() && b.time_s.is_none() && b.target_error.is_none() {
-            return fail("nothing says when the job is done; give --spp, --time or --target-error".into());
+        if b.spp.is_none() && b.mpp.is_none() && b.time_s.is_none() && b.target_error.is_none() {
+            return fail(
+                "nothing says when the job is done; give --spp (--mpp for mmlt), --time or --target-error".into(),
+            );
         }
         if b.spp == Some(0) || b.spp.is_some_and(|n| n > 1 << 24) {
             return fail(format!("--spp {} is out of range; it goes from 1 to {}", b.spp.unwrap_or(0), 1 << 24));
+        }
+        if b.mpp == Some(0) || b.mpp.is_some_and(|n| n > 1 << 24) {
+            return fail(format!("--mpp {} is out of range; it goes from 1 to {}", b.mpp.unwrap_or(0), 1 << 24));
+        }
+        let chains = self.integrator == IntegratorKind::Mmlt;
+        if chains && b.spp.is_some() {
+            return fail("mmlt makes mutations, not samples; give --mpp in place of --spp".into());
+        }
+        if !chains && b.mpp.is_some() {
+            return fail(format!(
+                "{} makes samples, not mutations; give --spp in place of --mpp",
+                self.integrator.name()
+            ));
+        }
+        if let Err(m) = self.mmlt.validate() {
+            return fail(m);
         }
         if b.time_s.is_some_and(|t| !(t > 0.0 && t.is_finite())) {
             return fail("--time must be a positive number of seconds".into());
@@ -138,6 +172,21 @@ impl RenderSettings {
         }
         Ok(())
     }
+}
+
+/// What ends the job: the command line, else the scene's samples per pixel (as mutations, where the integrator makes those).
+fn budget(options: &RenderOptions, scene: &RenderDefaults, integrator: IntegratorKind) -> Budget {
+    let mut budget =
+        Budget { spp: options.spp, mpp: options.mpp, time_s: options.time_s, target_error: options.target_error };
+    if budget == Budget::default() {
+        let count = Some(scene.spp.unwrap_or(64));
+        if integrator == IntegratorKind::Mmlt {
+            budget.mpp = count;
+        } else {
+            budget.spp = count;
+        }
+    }
+    budget
 }
 
 fn bad_depth(depth: i32) -> SettingsError {

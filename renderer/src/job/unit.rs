@@ -1,4 +1,5 @@
 use crate::film::{Counters, Rect, SplatSums, TileSums};
+use crate::integrator::mmlt::{BootstrapSums, ChainStats};
 use serde::{Deserialize, Serialize};
 
 /// One piece of work: a pure function of (scene, settings, plan, unit).
@@ -35,10 +36,28 @@ pub enum UnitKind {
         /// One past the last.
         end: u64,
     },
+    /// Independent samples `start..end` of paths of one length.
+    Bootstrap {
+        /// Edges of the paths.
+        edges: u32,
+        /// First sample.
+        start: u32,
+        /// One past the last.
+        end: u32,
+    },
+    /// Chains `first..end` of a part of the plan.
+    Chains {
+        /// Number of the part.
+        part: u32,
+        /// First chain.
+        first: u32,
+        /// One past the last.
+        end: u32,
+    },
 }
 
 /// What a unit found: unnormalised sums and counts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct UnitResult {
     /// Sums of a tile, if the unit has one.
     pub tile: Option<TileSums>,
@@ -48,6 +67,10 @@ pub struct UnitResult {
     pub paths: u64,
     /// Per light, the luminance that its paths splatted: the next pass's selection weights come from it. Empty for tiles.
     pub light_sums: Vec<f64>,
+    /// What a bootstrap unit found.
+    pub bootstrap: Option<BootstrapSums>,
+    /// How the mutations of chains fared.
+    pub chains: Option<ChainStats>,
     /// What was met.
     pub counters: Counters,
 }

@@ -114,13 +114,13 @@ impl Emitter for AreaLight {
         Some(LiSample { wi, dist, radiance: self.radiance_at(ctx, s.uv), pdf, delta: false, light })
     }
 
-    fn pdf_li(&self, _ctx: &LightContext, p: Vec3, hit: &Interaction) -> f32 {
+    fn pdf_li(&self, _ctx: &LightContext, p: Vec3, at: &Anchor) -> f32 {
         if let Some(pdf) = self.sphere.and_then(|sphere| sphere.pdf(p)) {
             return if pdf.is_finite() { pdf } else { 0.0 };
         }
-        let to_light = hit.p - p;
+        let to_light = at.p - p;
         let dist2 = to_light.length_squared();
-        self.solid_angle_pdf(dist2, hit.ng.dot(to_light) / dist2.sqrt()).unwrap_or(0.0)
+        self.solid_angle_pdf(dist2, at.ng.dot(to_light) / dist2.sqrt()).unwrap_or(0.0)
     }
 
     fn radiance(&self, ctx: &LightContext, hit: &Interaction, w: Vec3) -> Rgb {

@@ -31,7 +31,7 @@ pub use select::LightSelector;
 pub use spot::SpotLight;
 
 use crate::geometry::{Geometry, Interaction, ObjectId};
-use crate::math::{Vec2, Vec3};
+use crate::math::{Anchor, Vec2, Vec3};
 use crate::spectrum::Rgb;
 
 /// Why a light was refused.
@@ -65,7 +65,7 @@ trait Emitter {
     fn pdf_le(&self, ctx: &LightContext, ng: Vec3, w: Vec3) -> (f32, f32);
     fn power(&self, ctx: &LightContext) -> Rgb;
 
-    fn pdf_li(&self, _ctx: &LightContext, _p: Vec3, _hit: &Interaction) -> f32 {
+    fn pdf_li(&self, _ctx: &LightContext, _p: Vec3, _at: &Anchor) -> f32 {
         0.0
     }
     fn radiance(&self, _ctx: &LightContext, _hit: &Interaction, _w: Vec3) -> Rgb {
@@ -121,11 +121,11 @@ macro_rules! lights {
                 match self { $(Self::$variant(l) => l.sample_li(ctx, p, uc, u),)* }
             }
 
-            /// Density per solid angle at `p` with which `sample_li` gives the point `hit` on this light's surface; 0 for lights
+            /// Density per solid angle at `p` with which `sample_li` gives the point `at` of this light's surface; 0 for lights
             /// without one.
             #[inline]
-            pub fn pdf_li(&self, ctx: &LightContext, p: Vec3, hit: &Interaction) -> f32 {
-                match self { $(Self::$variant(l) => l.pdf_li(ctx, p, hit),)* }
+            pub fn pdf_li(&self, ctx: &LightContext, p: Vec3, at: &Anchor) -> f32 {
+                match self { $(Self::$variant(l) => l.pdf_li(ctx, p, at),)* }
             }
 
             /// Radiance that the point `hit` of this light's surface emits in direction `w` (away from the surface).

@@ -1,4 +1,16 @@
-//! What all integrators share: weights of multiple importance sampling, Russian roulette.
+//! What all integrators share: walks from both ends, their vertices and connections, weights of multiple importance sampling, Russian
+//! roulette.
+
+mod connect;
+mod counters;
+pub mod mis;
+mod vertex;
+mod walk;
+
+pub use connect::Connection;
+pub use counters::Counters;
+pub use vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};
+pub use walk::Tracer;
 
 use crate::spectrum::Rgb;
 

@@ -4,7 +4,7 @@ use super::Sampler;
 use crate::math::Vec2;
 
 /// 2^64 divided by the golden ratio, made odd: the step of SplitMix64's counter.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+pub(super) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Mixes 64 bits, bijectively (SplitMix64's finaliser: variant 13 of Stafford 2011, "Better Bit Mixing").
 #[inline]

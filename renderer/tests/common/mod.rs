@@ -56,12 +56,10 @@ pub fn build(desc: SceneDesc) -> Scene {
 /// Renders a scene.
 pub fn render(scene: &Scene, kind: IntegratorKind, size: (u32, u32), spp: u32, depth: i32, seed: u64) -> MergedImage {
     let options = RenderOptions {
-        integrator: Some(kind),
-        spp: Some(spp),
         size: Some(size),
         max_depth: Some(depth),
         seed: Some(seed),
-        ..Default::default()
+        ..RenderOptions::counting(kind, spp)
     };
     let mut settings = RenderSettings::resolve(&options, &scene.defaults).unwrap();
     settings.filter = FilterDesc::Box { radius: 0.5 };

@@ -67,7 +67,7 @@ impl Example {
         };
         let hit = self.geometry.interaction(&ray, &hit);
         let radiance = f64::from(self.light.radiance(&ctx, &hit, -w).luminance());
-        (radiance, if radiance > 0.0 { f64::from(self.light.pdf_li(&ctx, p, &hit)) } else { 0.0 })
+        (radiance, if radiance > 0.0 { f64::from(self.light.pdf_li(&ctx, p, &hit.anchor())) } else { 0.0 })
     }
 
     /// Points from which the light is looked at: near (on both sides of a surface), far, within.

@@ -1,0 +1,216 @@
+//! Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, chapter 10): every way to make a path from a walk from the
+//! camera and one from a light, combined by multiple importance sampling.
+
+use super::UnitContext;
+use crate::film::{Aov, Counters, Rect, SplatSums, TileSums};
+use crate::math::{Ray, Vec2};
+use crate::path::mis::Heuristic;
+use crate::path::{Connection, Subpath, Tracer, VertexKind};
+use crate::sampling::{Sampler, SobolSampler};
+use crate::spectrum::Rgb;
+use std::ops::Range;
+
+/// Streams of the walks from the lights lie beyond all pixel numbers.
+const LIGHT_STREAM: u64 = 1 << 41;
+/// Blocks of numbers for the connections of vertex i lie beyond those of all walks.
+const CONNECTIONS: u32 = 1 << 20;
+
+/// Receives the paths of a sample, each with the strategy (s, t) that made it; visibility is tested already.
+pub trait Sink {
+    /// A path that counts.
+    fn add(&mut self, s: usize, t: usize, path: &Connection);
+}
+
+/// Makes samples: a walk from each end and all connections between them.
+pub struct Bidirectional<'a> {
+    tracer: Tracer<'a>,
+    /// Edges of the longest path.
+    max_depth: usize,
+    /// Contributions below this are tested by chance only; 0 = never.
+    threshold: f32,
+    camera: Subpath,
+    light: Subpath,
+}
+
+impl<'a> Bidirectional<'a> {
+    /// For a unit.
+    pub fn new(c: &UnitContext<'a>) -> Self {
+        let tracer = Tracer {
+            scene: c.scene,
+            camera: &c.view.camera,
+            selector: c.selector,
+            rr_depth: Some(c.rr_depth),
+            heuristic: Heuristic::Power,
+            counters: Counters::default(),
+        };
+        let max_depth = c.max_depth as usize;
+        Self { tracer, max_depth, threshold: c.threshold, camera: Subpath::default(), light: Subpath::default() }
+    }
+
+    /// What was met so far.
+    pub fn counters(&self) -> Counters {
+        self.tracer.counters
+    }
+
+    /// The walk from the camera of the last sample.
+    pub fn camera_walk(&self) -> &Subpath {
+        &self.camera
+    }
+
+    /// One sample: the camera walk along `ray`, a walk from a light, and what their vertices make together.
+    pub fn sample<S: Sampler>(
+        &mut self,
+        ray: Ray,
+        camera_numbers: &mut S,
+        light_numbers: &mut S,
+        sink: &mut impl Sink,
+    ) {
+        let limit = self.max_depth.saturating_add(1);
+        self.tracer.camera_walk(&mut self.camera, camera_numbers, ray, limit);
+        self.tracer.light_walk(&mut self.light, light_numbers, self.max_depth);
+        let (from_camera, from_light) = (self.camera.vertices.len(), self.light.vertices.len());
+
+        // Light that the camera walk ran into.
+        for t in 2..=from_camera {
+            if let Some(path) = self.tracer.hit(&self.camera, t) {
+                sink_if_valid(&mut self.tracer.counters, sink, (0, t), &path);
+            }
+        }
+        if from_camera < limit {
+            let mut escaped = self.tracer.counters;
+            for path in self.tracer.escaped(&self.camera) {
+                sink_if_valid(&mut escaped, sink, (0, from_camera + 1), &path);
+            }
+            self.tracer.counters = escaped;
+        }
+
+        // Walk's vertices joined to lights and to each other.
+        for t in 2..=from_camera.min(self.max_depth) {
+            camera_numbers.start_vertex(CONNECTIONS + t as u32);
+            let (uc, u) = (camera_numbers.next_1d(), camera_numbers.next_2d());
+            let path = self.tracer.next_event(&self.camera, t, uc, u);
+            let rr = camera_numbers.next_1d();
+            self.finish(path, rr, (1, t), sink);
+            for s in 2..=from_light.min(limit - t) {
+                let path = self.tracer.join(&self.light, s, &self.camera, t);
+                if path.is_some() {
+                    light_numbers.start_vertex(CONNECTIONS + (t * 64 + s) as u32);
+                    let rr = light_numbers.next_1d();
+                    self.finish(path, rr, (s, t), sink);
+                }
+            }
+        }
+
+        // The walk from the light, seen by the camera.
+        for s in 2..=from_light {
+            light_numbers.start_vertex(CONNECTIONS + s as u32);
+            let lens_u = self.tracer.lens_numbers(light_numbers);
+            let path = self.tracer.to_lens(&self.light, s, lens_u);
+            let rr = light_numbers.next_1d();
+            self.finish(path, rr, (s, 1), sink);
+        }
+    }
+
+    /// Tests visibility, unless the path carries so little that it is left to chance, and hands it on.
+    fn finish(&mut self, path: Option<Connection>, u: f32, strategy: (usize, usize), sink: &mut impl Sink) {
+        let Some(mut path) = path else { return };
+        let weighted = path.weighted();
+        if weighted.is_black() {
+            return;
+        }
+        let q = weighted.max_component() / self.threshold;
+        if q < 1.0 && path.raster.is_none() {
+            if u >= q {
+                return;
+            }
+            path.value /= q;
+        }
+        if self.tracer.is_free(&path) {
+            sink_if_valid(&mut self.tracer.counters, sink, strategy, &path);
+        }
+    }
+}
+
+fn sink_if_valid(counters: &mut Counters, sink: &mut impl Sink, (s, t): (usize, usize), path: &Connection) {
+    if counters.admit(path.weighted()) {
+        sink.add(s, t, path);
+    }
+}
+
+/// Adds paths up: those of t = 1 to the pixels that they fall on, all others to the sample's own.
+struct Film<'a> {
+    c: &'a UnitContext<'a>,
+    pixel: Rgb,
+    splats: &'a mut SplatSums,
+}
+
+impl Sink for Film<'_> {
+    fn add(&mut self, _s: usize, _t: usize, path: &Connection) {
+        match path.raster {
+            None => self.pixel += path.weighted(),
+            Some(raster) => {
+                for (x, y, weight) in self.c.view.filter.weights(raster).iter() {
+                    self.splats.add(x, y, path.weighted() * weight);
+                }
+            }
+        }
+    }
+}
+
+/// Renders samples `samples` of each pixel of a tile, and the splats of their walks from the lights over the whole film; `None` when
+/// stopped. As many walks start at lights as at the camera: the sum of the splats over their number is their part of the image.
+pub fn render_tile(
+    c: &UnitContext<'_>,
+    rect: Rect,
+    samples: Range<u32>,
+    splats: &mut SplatSums,
+    counters: &mut Counters,
+) -> Option<TileSums> {
+    let mut sums = Vec::with_capacity(rect.area());
+    let mut aovs = Vec::with_capacity(if c.replicate == 0 { rect.area() } else { 0 });
+    let mut bdpt = Bidirectional::new(c);
+    let mut film = Film { c, pixel: Rgb::ZERO, splats };
+    for (x, y) in rect.pixels() {
+        if x == rect.x0 && (c.stopped)() {
+            return None;
+        }
+        let mut sum = [0.0f64; 3];
+        let mut aov = Aov::default();
+        let pixel = u64::from(y) * u64::from(c.view.width) + u64::from(x);
+        for index in samples.clone() {
+            let mut sampler = SobolSampler::new(c.seed, c.replicate, pixel, index);
+            let mut light_sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + pixel, index);
+            let raster = c.view.filter.sample(sampler.next_2d(), x, y);
+            let lens = if c.view.camera.is_pinhole() { Vec2::ZERO } else { sampler.next_2d() };
+            let ray = c.view.camera.generate_ray(raster, lens);
+            film.pixel = Rgb::ZERO;
+            bdpt.sample(ray, &mut sampler, &mut light_sampler, &mut film);
+            for (to, from) in sum.iter_mut().zip(film.pixel.to_array()) {
+                *to += f64::from(from);
+            }
+            if c.replicate == 0 {
+                first_hit(&mut aov, bdpt.camera_walk());
+            }
+        }
+        sums.push(Rgb::from(sum.map(|v| v as f32)));
+        if c.replicate == 0 {
+            aovs.push(aov);
+        }
+    }
+    counters.add(&bdpt.counters());
+    counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
+    Some(TileSums { rect, samples: samples.end - samples.start, sums, aovs })
+}
+
+/// What the first surface is, for the auxiliary images.
+fn first_hit(aov: &mut Aov, camera: &Subpath) {
+    let [lens, first, ..] = camera.vertices.as_slice() else { return };
+    if let VertexKind::Surface(shading) = &first.kind {
+        aov.add(&Aov {
+            albedo: shading.bsdf.albedo().to_array(),
+            normal: shading.frame.n.to_array(),
+            depth: (first.anchor.p - lens.anchor.p).length(),
+            hits: 1.0,
+        });
+    }
+}

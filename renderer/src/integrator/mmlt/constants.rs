@@ -1,0 +1,156 @@
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+
+/// Side of a cell of the target map in pixels.
+pub const TARGET_CELL: u32 = 16;
+
+/// How chains run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MmltOptions {
+    /// Probability of a large step.
+    pub large_step: f32,
+    /// Smallest small step.
+    pub step_min: f32,
+    /// Largest small step.
+    pub step_max: f32,
+    /// Combine large steps with the chain by the balance heuristic.
+    pub kelemen: bool,
+    /// Exponent by which dark regions are lifted: 0 = luminance alone, 1 = the same relative error everywhere.
+    pub lift: f32,
+    /// Learn the probabilities of the techniques from the pilot.
+    pub learn: bool,
+    /// Mutations of one chain.
+    pub chain_length: u32,
+    /// Ordinary samples of emission and direct light, for each mutation.
+    pub direct_share: f32,
+    /// Edges of the longest path that chains carry; ordinary samples carry the rest.
+    pub longest: u32,
+}
+
+impl Default for MmltOptions {
+    fn default() -> Self {
+        Self {
+            large_step: 0.3,
+            step_min: 1.0 / 1024.0,
+            step_max: 1.0 / 64.0,
+            kelemen: true,
+            lift: 0.5,
+            learn: true,
+            chain_length: 8192,
+            direct_share: 0.25,
+            longest: 24,
+        }
+    }
+}
+
+impl MmltOptions {
+    /// The method as published: no weights for large steps, luminance as the target, techniques alike, few long chains.
+    pub const PLAIN: Self = Self {
+        large_step: 0.3,
+        step_min: 1.0 / 1024.0,
+        step_max: 1.0 / 64.0,
+        kelemen: false,
+        lift: 0.0,
+        learn: false,
+        chain_length: 1 << 18,
+        direct_share: 0.25,
+        longest: 24,
+    };
+
+    /// Checks what came from a user or over the wire.
+    pub fn validate(&self) -> Result<(), String> {
+        let fail = |what: &str| Err(format!("mmlt: {what}"));
+        if !(self.large_step > 0.0 && self.large_step <= 1.0) {
+            return fail("large_step must be a probability above 0");
+        }
+        if !(self.step_min > 0.0 && self.step_min <= self.step_max && self.step_max <= 0.5) {
+            return fail("steps must fulfil 0 < step_min <= step_max <= 0.5");
+        }
+        if !(0.0..=1.0).contains(&self.lift) {
+            return fail("lift must lie between 0 and 1");
+        }
+        if !(self.direct_share > 0.0 && self.direct_share <= 100.0) {
+            return fail("direct_share must lie between 0 and 100");
+        }
+        if !(1..=1 << 24).contains(&self.chain_length) || !(2..=255).contains(&self.longest) {
+            return fail("chain_length must lie between 1 and 16777216, longest between 2 and 255");
+        }
+        Ok(())
+    }
+}
+
+impl std::str::FromStr for MmltOptions {
+    type Err = String;
+
+    /// `plain`, or `key=value` pairs, separated by commas; later ones win.
+    fn from_str(text: &str) -> Result<Self, String> {
+        // A plain struct of numbers always serialises.
+        let object = |o: Self| serde_json::to_value(o).map_err(|e| e.to_string());
+        let mut value = object(Self::default())?;
+        for item in text.split(',').filter(|item| !item.is_empty()) {
+            if item == "plain" {
+                value = object(Self::PLAIN)?;
+                continue;
+            }
+            let (key, number) =
+                item.split_once('=').ok_or_else(|| format!("{item:?} is neither `plain` nor key=value"))?;
+            let Some(slot) = value.get_mut(key) else {
+                let known = value.as_object().map(|o| o.keys().cloned().collect::<Vec<_>>().join(", "));
+                return Err(format!("there is no option {key:?} (known: {})", known.unwrap_or_default()));
+            };
+            *slot = serde_json::from_str(number).map_err(|_| format!("{number:?} is not a value for {key}"))?;
+        }
+        let options: Self = serde_json::from_value(value).map_err(|e| e.to_string())?;
+        options.validate()?;
+        Ok(options)
+    }
+}
+
+/// Paths of one length.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Depth {
+    /// Edges of the path.
+    pub edges: u32,
+    /// Weight of the technique with s vertices from the light, s = 0 ..= edges; 0 = not proposed.
+    pub techniques: Vec<f32>,
+}
+
+/// What the chains of a pass have in common; a constant of its plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChainConstants {
+    /// The path lengths.
+    pub depths: Vec<Depth>,
+    /// Cells of the target map across the picture.
+    pub columns: u32,
+    /// Factor of the target by cell, row by row; empty = 1 everywhere.
+    pub target: Vec<f32>,
+}
+
+impl ChainConstants {
+    /// Those of a length.
+    pub fn depth(&self, edges: u32) -> Option<&Depth> {
+        self.depths.iter().find(|d| d.edges == edges)
+    }
+
+    /// Factor of the target at a raster position.
+    #[inline]
+    pub fn target_at(&self, x: f32, y: f32) -> f32 {
+        if self.target.is_empty() {
+            return 1.0;
+        }
+        let cell = |v: f32| (v.max(0.0) as u32) / TARGET_CELL;
+        let column = cell(x).min(self.columns - 1) as usize;
+        let rows = self.target.len() / self.columns as usize;
+        let row = (cell(y) as usize).min(rows - 1);
+        self.target[row * self.columns as usize + column]
+    }
+}
+
+/// The techniques by which paths of `edges` edges can be made in a scene: 1 for those that can, 0 for those that can't.
+pub fn allowed_techniques(scene: &Scene, edges: u32) -> Vec<f32> {
+    let hittable = scene.lights.iter().any(|l| !l.flags().is_delta());
+    (0..=edges).map(|s| f32::from(u8::from(s > 0 || hittable))).collect()
+}

@@ -1,0 +1,126 @@
+use super::constants::{ChainConstants, MmltOptions};
+use crate::integrator::UnitContext;
+use crate::math::Vec2;
+use crate::path::mis::Heuristic;
+use crate::path::{Connection, Counters, Subpath, Tracer};
+use crate::sampling::{Discrete, PrimarySpace, Sampler, StepSizes, Stream};
+use crate::spectrum::Rgb;
+
+/// The path that a point of primary sample space makes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proposal {
+    /// Its weighted contribution to the picture over the probability of its technique.
+    pub value: Rgb,
+    /// What the chain's density is proportional to; 0 where there is no path.
+    pub target: f32,
+    /// Where it falls.
+    pub raster: Vec2,
+    /// Vertices from the light.
+    pub technique: u32,
+}
+
+/// Makes paths of one length from points of primary sample space.
+pub struct Evaluator<'a> {
+    /// Traces and counts.
+    pub tracer: Tracer<'a>,
+    constants: &'a ChainConstants,
+    size: Vec2,
+    edges: usize,
+    techniques: Discrete,
+    sizes: StepSizes,
+    camera: Subpath,
+    light: Subpath,
+}
+
+impl<'a> Evaluator<'a> {
+    /// For paths of `edges` edges; `None` when no technique makes any.
+    pub fn new(c: &UnitContext<'a>, constants: &'a ChainConstants, options: &MmltOptions, edges: u32) -> Option<Self> {
+        let depth = constants.depth(edges)?;
+        if depth.techniques.len() != edges as usize + 1 {
+            return None;
+        }
+        Some(Self {
+            tracer: Tracer {
+                scene: c.scene,
+                camera: &c.view.camera,
+                selector: c.selector,
+                rr_depth: None,
+                heuristic: Heuristic::Power,
+                counters: Counters::default(),
+            },
+            constants,
+            size: Vec2::new(c.view.width as f32, c.view.height as f32),
+            edges: edges as usize,
+            techniques: Discrete::new(&depth.techniques)?,
+            sizes: StepSizes::new(f64::from(options.step_min), f64::from(options.step_max)),
+            camera: Subpath::default(),
+            light: Subpath::default(),
+        })
+    }
+
+    /// The path of the space's proposal.
+    pub fn evaluate(&mut self, space: &mut PrimarySpace) -> Proposal {
+        let choice = self.techniques.sample(space.stream(Stream::Technique, &self.sizes).next_1d());
+        let s = choice.index;
+        let mut proposal = Proposal { value: Rgb::ZERO, target: 0.0, raster: Vec2::ZERO, technique: s as u32 };
+        let Some((value, raster)) = self.path(space, s) else { return proposal };
+        let value = value / choice.pmf;
+        let inside = raster.x >= 0.0 && raster.y >= 0.0 && raster.x < self.size.x && raster.y < self.size.y;
+        if !inside || !self.tracer.counters.admit(value) {
+            return proposal;
+        }
+        let target = value.luminance() * self.constants.target_at(raster.x, raster.y);
+        if target > 0.0 && target.is_finite() {
+            proposal.value = value;
+            proposal.raster = raster;
+            proposal.target = target;
+        }
+        proposal
+    }
+
+    /// Weighted contribution to the whole picture of the path with s vertices from the light, and where it falls.
+    fn path(&mut self, space: &mut PrimarySpace, s: usize) -> Option<(Rgb, Vec2)> {
+        let t = self.edges + 1 - s;
+        let mut lens = space.stream(Stream::Lens, &self.sizes);
+        let raster = lens.next_2d() * self.size;
+        let lens_u = self.tracer.lens_numbers(&mut lens);
+        if t == 1 {
+            self.walk_light(space, s)?;
+            let path = self.tracer.to_lens(&self.light, s, lens_u)?;
+            return self.visible(&path).map(|value| (value, path.raster.unwrap_or_default()));
+        }
+        let ray = self.tracer.camera.generate_ray(raster, lens_u);
+        self.tracer.camera_walk(&mut self.camera, &mut space.stream(Stream::Camera, &self.sizes), ray, t);
+        // A raster position uniform over the picture stands for all of its pixels.
+        let pixels = self.size.x * self.size.y;
+        let made = self.camera.vertices.len();
+        let value = match s {
+            0 if made == t => self.tracer.hit(&self.camera, t).map(|path| path.weighted()),
+            0 if made + 1 == t => {
+                Some(self.tracer.escaped(&self.camera).fold(Rgb::ZERO, |sum, path| sum + path.weighted()))
+            }
+            _ if made < t => None,
+            1 => {
+                let mut numbers = space.stream(Stream::Connection, &self.sizes);
+                let (uc, u) = (numbers.next_1d(), numbers.next_2d());
+                self.tracer.next_event(&self.camera, t, uc, u).and_then(|path| self.visible(&path))
+            }
+            _ => {
+                self.walk_light(space, s)?;
+                self.tracer.join(&self.light, s, &self.camera, t).and_then(|path| self.visible(&path))
+            }
+        };
+        value.map(|value| (value * pixels, raster))
+    }
+
+    /// Walks from the light; `None` when it ends before there are s vertices.
+    fn walk_light(&mut self, space: &mut PrimarySpace, s: usize) -> Option<()> {
+        self.tracer.light_walk(&mut self.light, &mut space.stream(Stream::Light, &self.sizes), s);
+        (self.light.vertices.len() == s).then_some(())
+    }
+
+    fn visible(&mut self, path: &Connection) -> Option<Rgb> {
+        let value = path.weighted();
+        (!value.is_black() && self.tracer.is_free(path)).then_some(value)
+    }
+}

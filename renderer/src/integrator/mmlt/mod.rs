@@ -1,0 +1,23 @@
+//! Multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014): Markov chains over the numbers that drive
+//! bidirectional path tracing, one chain for one path length, the technique being one of the numbers.
+//!
+//! A chain of paths with k edges visits points u of primary sample space with density `c(u) / b`, where `F(u)` is the weighted
+//! contribution of the path that u makes, `c` a positive scalar of it and `b` the integral of c. Beside what Hachisuka et al. describe:
+//!
+//! * c is luminance times a factor per region of the picture, learned from a pilot, so that dark regions get their share
+//!   (Veach 1997, section 11.4.3; Hoberock and Hart 2010, "Arbitrary Importance Functions for Metropolis Light Transport");
+//! * the technique is chosen with probabilities learned from the pilot;
+//! * what a large step finds is combined with the chain by the balance heuristic (Kelemen et al. 2002, section 3.4), so that what the
+//!   chain seldom visits is as good as ordinary samples make it;
+//! * chains are short and many, their starts drawn by systematic resampling from a pool of independent samples, which makes them free
+//!   of start-up bias (Veach 1997, section 11.3.1).
+
+mod bootstrap;
+mod chain;
+mod constants;
+mod evaluate;
+
+pub use bootstrap::{BootstrapSums, run_bootstrap};
+pub use chain::{ChainStart, ChainStats, ChainTask, Mismatch, run_chains};
+pub use constants::{ChainConstants, Depth, MmltOptions, TARGET_CELL, allowed_techniques};
+pub use evaluate::{Evaluator, Proposal};

@@ -1,0 +1,209 @@
+//! What each strategy makes of two walks: contribution, weight, and the ray that must be free.
+//!
+//! Strategy (s, t) takes s vertices from the light and t from the camera (Veach 1997, section 10.2). A contribution is the radiance that
+//! the path carries over the density with which the strategy makes it, without its weight and without visibility.
+
+use super::mis::Step;
+use super::vertex::{Subpath, Vertex, VertexKind};
+use super::walk::Tracer;
+use crate::bsdf::{ShadingPoint, Transport};
+use crate::math::{Anchor, Ray, Vec2, Vec3};
+use crate::spectrum::Rgb;
+
+/// A path made by one strategy.
+#[derive(Clone, Copy, Debug)]
+pub struct Connection {
+    /// Contribution, unweighted.
+    pub value: Rgb,
+    /// Weight of the strategy for this path.
+    pub weight: f64,
+    /// The ray that must be free; `None` where there is nothing to test.
+    pub shadow: Option<Ray>,
+    /// Where it falls on the picture, for t = 1: elsewhere than the camera walk's own place.
+    pub raster: Option<Vec2>,
+}
+
+impl Connection {
+    /// Contribution times weight.
+    #[inline]
+    pub fn weighted(&self) -> Rgb {
+        self.value * self.weight as f32
+    }
+}
+
+impl Vertex {
+    /// The surface that is here, if it can be connected to.
+    #[inline]
+    fn connectible(&self) -> Option<&ShadingPoint> {
+        match &self.kind {
+            VertexKind::Surface(shading) if !shading.is_delta_only() => Some(shading),
+            _ => None,
+        }
+    }
+}
+
+/// Factor from a density of directions at `from` to the density of the vertex `at`, which they meet along `w`.
+#[inline]
+fn per_area(at: &Anchor, w: Vec3, d2: f64) -> f64 {
+    let cos = if at.ng == Vec3::ZERO { 1.0 } else { f64::from(at.ng.dot(w).abs()) };
+    cos / d2
+}
+
+impl Tracer<'_> {
+    /// Strategy (0, t): vertex t - 1 of the camera walk lies on a light.
+    pub fn hit(&self, camera: &Subpath, t: usize) -> Option<Connection> {
+        let at = &camera.vertices[t - 1];
+        let (index, radiance) = at.emitted.filter(|(_, radiance)| !radiance.is_black())?;
+        let value = at.beta * radiance;
+        if t == 2 {
+            return Some(Connection { value, weight: 1.0, shadow: None, raster: None });
+        }
+        let before = &camera.vertices[t - 2];
+        let context = self.scene.light_context();
+        let light = &self.scene.lights[index as usize];
+        let w = (before.anchor.p - at.anchor.p).normalize();
+        let pmf = self.selector.pmf(index as usize);
+        let (pdf_pos, pdf_dir) = light.pdf_le(&context, at.anchor.ng, w);
+        // The light's point when sampled from the surface before it, over when a walk starts there.
+        let solid = f64::from(light.pdf_li(&context, before.anchor.p, &at.anchor));
+        let direct = solid * at.edge.forward / f64::from(pdf_pos);
+        let pdf_rev = f64::from(pmf * pdf_pos);
+        let weight = self.hit_weight(camera, t, pdf_rev, at.pdf_fwd, direct, f64::from(pdf_dir) * at.edge.backward);
+        Some(Connection { value, weight, shadow: None, raster: None })
+    }
+
+    /// Strategy (0, t) for a camera walk of t - 1 vertices that left the scene: one path for each light that it sees.
+    pub fn escaped<'b>(&'b self, camera: &'b Subpath) -> impl Iterator<Item = Connection> + 'b {
+        let lights = camera.escape.map(|e| self.scene.infinite_lights.iter().map(move |index| (e, *index)));
+        lights.into_iter().flatten().filter_map(move |(e, index)| {
+            let light = &self.scene.lights[index as usize];
+            let radiance = light.le_infinite(e.w);
+            if radiance.is_black() {
+                return None;
+            }
+            let value = e.beta * radiance;
+            let t = camera.vertices.len() + 1;
+            if t == 2 {
+                return Some(Connection { value, weight: 1.0, shadow: None, raster: None });
+            }
+            let last = &camera.vertices[t - 2].anchor;
+            let pdf_rev = f64::from(self.selector.pmf(index as usize) * light.pdf_li_escaped(e.w));
+            let (pdf_pos, _) = light.pdf_le(&self.scene.light_context(), -e.w, -e.w);
+            let before = f64::from(pdf_pos * last.ng.dot(e.w).abs());
+            let weight = self.hit_weight(camera, t, pdf_rev, e.pdf, 1.0, before);
+            Some(Connection { value, weight, shadow: None, raster: None })
+        })
+    }
+
+    /// Weight of (0, t), t > 2. The walk made its point on the light with density `pdf_fwd`; a walk from the light makes it with `pdf_rev`
+    /// (times `direct` when it is sampled from the surface before), and that surface with `pdf_rev_before`.
+    fn hit_weight(
+        &self,
+        camera: &Subpath,
+        t: usize,
+        pdf_rev: f64,
+        pdf_fwd: f64,
+        direct: f64,
+        pdf_rev_before: f64,
+    ) -> f64 {
+        let h = self.heuristic;
+        let before = camera.step(t - 2, pdf_rev_before, false);
+        let sum = h.fold(camera.vertices[t - 3].tail, before);
+        let reach = if camera.vertices[t - 2].delta { 0.0 } else { direct };
+        h.weight(0.0, h.fold(sum, Step { ratio: pdf_rev / pdf_fwd, reach }), 1.0)
+    }
+
+    /// Strategy (1, t), t > 1: a light sampled from vertex t - 1 of the camera walk.
+    pub fn next_event(&self, camera: &Subpath, t: usize, uc: f32, u: Vec2) -> Option<Connection> {
+        let at = &camera.vertices[t - 1];
+        let shading = at.connectible()?;
+        let choice = self.selector.sample(uc)?;
+        let light = &self.scene.lights[choice.index];
+        let context = self.scene.light_context();
+        let li = light.sample_li(&context, at.anchor.p, choice.u, u)?;
+        let (f, pdf_bsdf) = shading.eval_pdf(li.wi, Transport::Radiance);
+        let pdf = li.pdf * choice.pmf;
+        let value = at.beta * f * li.radiance * (shading.abs_cos(li.wi) / pdf);
+        if value.is_black() {
+            return None;
+        }
+
+        // Densities of a walk that starts at this point of the light.
+        let flags = light.flags();
+        let (pdf_pos, pdf_dir) = light.pdf_le(&context, li.light.ng, -li.wi);
+        let (pdf_pos, pdf_dir) = (f64::from(pdf_pos), f64::from(pdf_dir));
+        let (onwards, direct) = if flags.infinite {
+            (pdf_pos * f64::from(at.anchor.ng.dot(li.wi).abs()), 1.0)
+        } else {
+            let d2 = f64::from(li.dist) * f64::from(li.dist);
+            let direct = if li.delta { 1.0 } else { f64::from(li.pdf) * per_area(&li.light, li.wi, d2) / pdf_pos };
+            (pdf_dir * per_area(&at.anchor, li.wi, d2), direct)
+        };
+        let back = f64::from(shading.pdf_reverse(li.wi, Transport::Importance)) * at.edge.backward;
+        let h = self.heuristic;
+        let camera_sum = camera.beyond(h, t - 1, onwards, back);
+        // The camera walk that hits the light: its density over that of sampling the light, in the same measure.
+        let reach = if li.delta { 0.0 } else { direct };
+        let light_sum = h.fold(0.0, Step { ratio: f64::from(pdf_bsdf) / f64::from(pdf), reach });
+        let weight = h.weight(light_sum, camera_sum, direct);
+        Some(Connection { value, weight, shadow: Some(li.shadow_ray(&at.anchor)), raster: None })
+    }
+
+    /// Strategy (s, 1), s > 1: vertex s - 1 of the light walk seen from the lens. The contribution is that of the whole picture, to be
+    /// weighted by the filter at `raster`.
+    pub fn to_lens(&self, light: &Subpath, s: usize, lens_u: Vec2) -> Option<Connection> {
+        let at = &light.vertices[s - 1];
+        let shading = at.connectible()?;
+        let we = self.camera.sample_we(at.anchor.p, lens_u)?;
+        let f = shading.eval(we.wi, Transport::Importance);
+        let cos = shading.abs_cos(we.wi) * shading.adjoint_correction(we.wi);
+        let value = at.beta * f * (cos * we.we / we.pdf);
+        if value.is_black() {
+            return None;
+        }
+        let (_, pdf_dir) = self.camera.pdf_we(-we.wi);
+        let d2 = f64::from(we.dist) * f64::from(we.dist);
+        let onwards = f64::from(pdf_dir) * per_area(&at.anchor, we.wi, d2);
+        let back = f64::from(shading.pdf_reverse(we.wi, Transport::Radiance)) * at.edge.backward;
+        let weight = self.heuristic.weight(light.beyond(self.heuristic, s - 1, onwards, back), 0.0, 1.0);
+        Some(Connection { value, weight, shadow: Some(we.shadow_ray(&at.anchor)), raster: Some(we.raster) })
+    }
+
+    /// Strategy (s, t), s > 1, t > 1: the two ends joined.
+    pub fn join(&self, light: &Subpath, s: usize, camera: &Subpath, t: usize) -> Option<Connection> {
+        let (x, z) = (&light.vertices[s - 1], &camera.vertices[t - 1]);
+        let (at_x, at_z) = (x.connectible()?, z.connectible()?);
+        let d = x.anchor.p - z.anchor.p;
+        let d2 = d.length_squared();
+        if !(d2 > 0.0) {
+            return None;
+        }
+        let w = d / d2.sqrt();
+        let (f_z, pdf_z) = at_z.eval_pdf(w, Transport::Radiance);
+        if f_z.is_black() {
+            return None;
+        }
+        let (f_x, pdf_x) = at_x.eval_pdf(-w, Transport::Importance);
+        let cos = at_z.abs_cos(w) * at_x.abs_cos(w) * at_x.adjoint_correction(-w);
+        let value = z.beta * x.beta * (f_z * f_x * (cos / d2));
+        if value.is_black() {
+            return None;
+        }
+        let d2 = f64::from(d2);
+        let to_x = f64::from(pdf_z) * per_area(&x.anchor, w, d2);
+        let to_z = f64::from(pdf_x) * per_area(&z.anchor, w, d2);
+        let back_x = f64::from(at_x.pdf_reverse(-w, Transport::Radiance)) * x.edge.backward;
+        let back_z = f64::from(at_z.pdf_reverse(w, Transport::Importance)) * z.edge.backward;
+        let h = self.heuristic;
+        let weight = h.weight(light.beyond(h, s - 1, to_x, back_x), camera.beyond(h, t - 1, to_z, back_z), 1.0);
+        Some(Connection { value, weight, shadow: Some(z.anchor.segment_to(&x.anchor)), raster: None })
+    }
+
+    /// Whether nothing is in a path's way.
+    #[inline]
+    pub fn is_free(&mut self, path: &Connection) -> bool {
+        let Some(ray) = &path.shadow else { return true };
+        self.counters.rays += 1;
+        !self.scene.accel.occluded(ray)
+    }
+}

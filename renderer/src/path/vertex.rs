@@ -1,0 +1,153 @@
+use super::mis::{Heuristic, Step};
+use crate::bsdf::ShadingPoint;
+use crate::light::LightFlags;
+use crate::math::{Anchor, Vec3};
+use crate::spectrum::Rgb;
+
+/// What is at a vertex.
+#[derive(Clone, Copy, Debug)]
+pub enum VertexKind {
+    /// The camera's lens.
+    Lens,
+    /// A point (or, infinitely far away, a direction) of a light.
+    Light,
+    /// A surface.
+    Surface(ShadingPoint),
+}
+
+/// A vertex of a walk.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// What is there.
+    pub kind: VertexKind,
+    /// Where it is.
+    pub anchor: Anchor,
+    /// The walk's throughput when it arrives here: emission (or importance) over density, and `f cos / pdf` of the vertices before.
+    pub beta: Rgb,
+    /// Density with which its own walk made it (see [`super::mis`] for the measure).
+    pub pdf_fwd: f64,
+    /// The way back to the vertex before.
+    pub edge: Edge,
+    /// Whether the walk went on through a delta lobe.
+    pub delta: bool,
+    /// Relative densities of the strategies that connect at or beyond this vertex, for a walk that went at least two vertices on.
+    pub tail: f64,
+    /// What the surface emits towards the vertex before: index of the light and radiance.
+    pub emitted: Option<(u32, Rgb)>,
+}
+
+/// Turns densities of directions into densities of vertices. A medium's distance densities belong into these two factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Density of the far vertex over that of the direction towards it.
+    pub forward: f64,
+    /// Density of the near vertex over that of the direction back to it.
+    pub backward: f64,
+}
+
+impl Edge {
+    /// No edge: the first vertex of a walk has none behind it.
+    pub const NONE: Self = Self { forward: 0.0, backward: 0.0 };
+
+    /// Between two points, with `w` the unit direction from the first to the second.
+    #[inline]
+    pub fn between(from: &Anchor, to: &Anchor, w: Vec3) -> Self {
+        let d2 = f64::from((to.p - from.p).length_squared());
+        Self { forward: abs_cos(to, w) / d2, backward: abs_cos(from, w) / d2 }
+    }
+
+    /// From a light infinitely far away, whose light travels along `w`: its direction is its vertex, and the point on the disk through
+    /// which the ray came is the first surface's.
+    #[inline]
+    pub fn from_infinity(to: &Anchor, w: Vec3) -> Self {
+        Self { forward: abs_cos(to, w), backward: 1.0 }
+    }
+}
+
+/// `|cos|` of the angle between a direction and a surface's geometric normal; 1 for a point in free space.
+#[inline]
+fn abs_cos(at: &Anchor, w: Vec3) -> f64 {
+    if at.ng == Vec3::ZERO { 1.0 } else { f64::from(at.ng.dot(w).abs()) }
+}
+
+/// The light that a walk started from.
+#[derive(Clone, Copy, Debug)]
+pub struct LightStart {
+    /// Index of the light.
+    pub index: usize,
+    /// What kind of light it is.
+    pub flags: LightFlags,
+    /// Density of the light's point when it is sampled from the first surface (s = 1), over that when the walk starts there.
+    pub direct: f64,
+}
+
+/// A walk that left the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Escape {
+    /// Its direction.
+    pub w: Vec3,
+    /// Its throughput.
+    pub beta: Rgb,
+    /// Density of the direction per solid angle.
+    pub pdf: f64,
+}
+
+/// A walk from one end of a path; reused from path to path.
+#[derive(Clone, Debug, Default)]
+pub struct Subpath {
+    /// The lens or the light, then surfaces.
+    pub vertices: Vec<Vertex>,
+    /// The light of a walk from the lights.
+    pub light: Option<LightStart>,
+    /// How a walk from the camera left the scene, if it did.
+    pub escape: Option<Escape>,
+}
+
+impl Subpath {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.vertices.clear();
+        self.light = None;
+        self.escape = None;
+    }
+
+    /// Whether a strategy may connect vertex `i` to its predecessor, counted from this walk's end: neither has a delta lobe there.
+    #[inline]
+    fn connects(&self, i: usize) -> bool {
+        i > 0 && !self.vertices[i].delta && !self.vertices[i - 1].delta
+    }
+
+    /// The step outwards past vertex `i`, which the other end's walk makes with density `pdf_rev`. `end` says whether `i` is the vertex
+    /// that is connected, and so not delta whatever the walk did there later.
+    #[inline]
+    pub fn step(&self, i: usize, pdf_rev: f64, end: bool) -> Step {
+        let ratio = pdf_rev / self.vertices[i].pdf_fwd;
+        let exists = match (&self.light, i) {
+            // The camera walk that hits the light.
+            (Some(light), 0) => !light.flags.is_delta(),
+            // Nothing hits a lens.
+            (None, 0) => false,
+            _ if end => !self.vertices[i - 1].delta,
+            _ => self.connects(i),
+        };
+        let own = match &self.light {
+            Some(light) if i == 1 => light.direct,
+            _ => 1.0,
+        };
+        Step { ratio, reach: if exists { own } else { 0.0 } }
+    }
+
+    /// Sum over the strategies beyond a connection at the vertex `end`, which the other walk makes with density `pdf_rev`, and the vertex
+    /// before it with `pdf_rev_before`.
+    #[inline]
+    pub fn beyond(&self, heuristic: Heuristic, end: usize, pdf_rev: f64, pdf_rev_before: f64) -> f64 {
+        let mut sum = 0.0;
+        if end >= 2 {
+            sum = self.vertices[end - 2].tail;
+        }
+        if end >= 1 {
+            sum = heuristic.fold(sum, self.step(end - 1, pdf_rev_before, false));
+        }
+        heuristic.fold(sum, self.step(end, pdf_rev, true))
+    }
+}
