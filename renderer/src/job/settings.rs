@@ -100,7 +100,8 @@ impl RenderSettings {
         let budget = budget(options, scene, integrator);
         let (width, height) = options.size.or(scene.size).unwrap_or((768, 432));
         let depth = options.max_depth.or(scene.max_depth).unwrap_or(-1);
-        let groups = if integrator == IntegratorKind::Path { REPLICATES } else { SPLAT_REPLICATES };
+        let sobol = matches!(integrator, IntegratorKind::Path | IntegratorKind::Bdpt);
+        let groups = if sobol { REPLICATES } else { SPLAT_REPLICATES };
         let settings = Self {
             integrator,
             budget,
