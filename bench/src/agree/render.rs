@@ -7,6 +7,9 @@ use renderer::job::{LocalOptions, RenderOptions, RenderSettings, Stop, render_lo
 use renderer::scene::Scene;
 use std::time::Instant;
 
+/// Least number of replicate groups of an integrator that splats.
+const SPLAT_GROUPS: u32 = 16;
+
 /// How much is rendered. It follows from what is in the pictures, never from a clock, so that the verdict does not either.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -16,10 +19,19 @@ pub struct Effort {
     pub aim: f64,
     /// Half width that must be reached.
     pub required: f64,
+    /// The same for Markov chains, whose image mean is that of their independent samples, and these are few.
+    pub required_of_chains: f64,
     /// Most rays of a picture, unless it would then have fewer than `least_spp`.
     pub rays: f64,
     /// Samples that a pixel needs for its error to be told at all.
     pub least_spp: u32,
+}
+
+impl Effort {
+    /// Half width that an integrator must reach.
+    pub fn required(&self, kind: IntegratorKind) -> f64 {
+        if kind == IntegratorKind::Mmlt { self.required_of_chains } else { self.required }
+    }
 }
 
 /// A picture and what it took.
@@ -27,7 +39,7 @@ pub struct Effort {
 pub struct Rendering {
     /// The picture.
     pub image: MergedImage,
-    /// Samples per pixel.
+    /// Samples (mutations) per pixel.
     pub spp: u32,
     /// Seconds, the pilot not counted.
     pub seconds: f64,
@@ -62,19 +74,22 @@ impl Task<'_> {
         // NaN, where the pilot could not tell, takes all that is allowed.
         let spp = needed.min(effort.rays / rays_per_spp.max(1.0)).max(f64::from(effort.least_spp));
         // Whole samples for each group.
-        self.render((spp / 16.0).ceil().min(1e6) as u32 * 16, self.seed)
+        let groups = f64::from(SPLAT_GROUPS);
+        self.render((spp / groups).ceil().min(1e6) as u32 * SPLAT_GROUPS, self.seed)
     }
 
     fn render(&self, spp: u32, seed: u64) -> Result<Rendering, String> {
         let options = RenderOptions {
-            integrator: Some(self.kind),
-            spp: Some(spp),
             size: Some(self.size),
             max_depth: self.max_depth.map(|n| i32::try_from(n).unwrap_or(-1)),
             seed: Some(seed),
-            ..Default::default()
+            ..RenderOptions::counting(self.kind, spp)
         };
-        let settings = RenderSettings::resolve(&options, &self.scene.defaults).map_err(|e| e.to_string())?;
+        let mut settings = RenderSettings::resolve(&options, &self.scene.defaults).map_err(|e| e.to_string())?;
+        if self.kind != IntegratorKind::Path {
+            // The errors of splatted areas have no more degrees of freedom than there are groups.
+            settings.replicates = settings.replicates.max(SPLAT_GROUPS);
+        }
         let started = Instant::now();
         let options = LocalOptions { threads: self.threads };
         let outcome =

@@ -30,6 +30,8 @@ pub struct Row {
     pub seconds: f64,
     /// Half the width of the 99 % interval of the image mean, relative: the largest of the channels.
     pub half_width: f64,
+    /// What it must not exceed.
+    pub required: f64,
     /// Contributions that were not numbers, or negative.
     pub dropped: u64,
     /// The tests.
@@ -47,78 +49,80 @@ pub struct Report {
     pub tests: usize,
     /// The level of each of them: 99 % for the whole family (Sidak).
     pub least_p: f64,
-    /// Half width that each picture had to reach.
-    pub required_half_width: f64,
     /// Whether all agree.
     pub passed: bool,
 }
 
 impl Report {
     /// Judges the rows.
-    pub fn new(mut rows: Vec<Row>, required: f64) -> Self {
+    pub fn new(mut rows: Vec<Row>) -> Self {
         let tests = rows.iter().filter_map(|r| r.comparison.as_ref()).map(|c| c.tests).sum::<usize>();
         let least_p = statcheck::sidak(FAMILY, tests.max(1));
         for row in &mut rows {
             row.verdict = match &row.comparison {
                 Some(c) if !c.agrees(least_p) => Verdict::Differs,
-                _ if !(row.half_width <= required) => Verdict::TooWide,
+                _ if !(row.half_width <= row.required) => Verdict::TooWide,
                 _ => Verdict::Agrees,
             };
         }
         let passed = rows.iter().all(|r| r.verdict == Verdict::Agrees);
-        Self { rows, tests, least_p, required_half_width: required, passed }
+        Self { rows, tests, least_p, passed }
     }
+}
+
+/// The head of [`figures`].
+const HEAD: &str = "scene               integrator  against               spp        s  half %   diff %    p mean   p block  rms z  \
+                    pixels %";
+
+/// A row without its verdict, which depends on all rows.
+pub fn figures(r: &Row) -> String {
+    let against = r.against.as_deref().unwrap_or("-");
+    let half = 100.0 * r.half_width;
+    let own = format!("{:18}  {:10}  {against:17}  {:7}  {:7.1}  {half:6.3}", r.scene, r.integrator, r.spp, r.seconds);
+    let Some(c) = &r.comparison else {
+        return own + &format!("  {:>7}  {:>8}  {:>8}  {:>5}  {:>8}", "-", "-", "-", "-", "-");
+    };
+    let (difference, pixels) = (100.0 * c.difference, 100.0 * c.pixels);
+    own + &format!("  {difference:+7.3}  {:8.2e}  {:8.2e}  {:5.2}  {pixels:8.2}", c.mean_p, c.block_p, c.block_rms_z)
+}
+
+/// What else is to be said of a row.
+fn remarks(r: &Row) -> String {
+    let mut text = String::new();
+    if r.dropped > 0 {
+        text += &format!(" ({} contributions dropped)", r.dropped);
+    }
+    let Some(c) = &r.comparison else { return text };
+    if c.noisy > 0 {
+        text +=
+            &format!(" ({} of {} blocks and channels too noisy to test)", c.noisy, c.noisy + c.tests.saturating_sub(3));
+    }
+    if let (Verdict::Differs, Some(w)) = (r.verdict, &c.worst) {
+        let place = w.block.map_or("image".into(), |[x, y]| format!("block at {x}, {y}"));
+        text += &format!(
+            "\n    {place}, {}: {:.6} against {:.6}, t = {:+.2} with {:.0} degrees of freedom, p = {:.2e}",
+            w.channel, w.mean, w.other, w.t, w.dof, w.p
+        );
+    }
+    text
 }
 
 /// The rows as a table.
 pub fn table(report: &Report) -> String {
-    let mut text = String::from(
-        "scene               integrator  against               spp        s  half %   diff %    p mean   p block  rms z  \
-         pixels %  verdict",
-    );
+    let mut text = format!("{HEAD}  verdict");
     for r in &report.rows {
-        let against = r.against.as_deref().unwrap_or("-");
-        text += &format!(
-            "\n{:18}  {:10}  {against:17}  {:7}  {:7.1}  {:6.3}",
-            r.scene,
-            r.integrator,
-            r.spp,
-            r.seconds,
-            100.0 * r.half_width
-        );
-        text += &match &r.comparison {
-            Some(c) => format!(
-                "  {:+7.3}  {:8.2e}  {:8.2e}  {:5.2}  {:8.2}",
-                100.0 * c.difference,
-                c.mean_p,
-                c.block_p,
-                c.block_rms_z,
-                100.0 * c.pixels
-            ),
-            None => format!("  {:>7}  {:>8}  {:>8}  {:>5}  {:>8}", "-", "-", "-", "-", "-"),
+        let verdict = match r.verdict {
+            Verdict::Agrees => "agrees".into(),
+            Verdict::Differs => "DIFFERS".into(),
+            Verdict::TooWide => format!("TOO WIDE, {} % is required", 100.0 * r.required),
         };
-        text += match r.verdict {
-            Verdict::Agrees => "  agrees",
-            Verdict::Differs => "  DIFFERS",
-            Verdict::TooWide => "  TOO WIDE",
-        };
-        if r.dropped > 0 {
-            text += &format!(" ({} contributions dropped)", r.dropped);
-        }
-        if let (Verdict::Differs, Some(w)) = (r.verdict, r.comparison.as_ref().and_then(|c| c.worst.as_ref())) {
-            let place = w.block.map_or("image".into(), |[x, y]| format!("block at {x}, {y}"));
-            text += &format!(
-                "\n    {place}, {}: {:.6} against {:.6}, t = {:+.2} with {:.0} degrees of freedom, p = {:.2e}",
-                w.channel, w.mean, w.other, w.t, w.dof, w.p
-            );
-        }
+        text += &format!("\n{}  {verdict}{}", figures(r), remarks(r));
     }
     let seconds: f64 = report.rows.iter().map(|r| r.seconds).sum();
     text += &format!(
-        "\n{} tests, each at p >= {:.2e}; half widths up to {} %; {seconds:.0} s of rendering: {}",
+        "\n{} tests, each at p >= {:.2e}; {seconds:.0} s of rendering: {}",
         report.tests,
         report.least_p,
-        100.0 * report.required_half_width,
         if report.passed { "all agree" } else { "NOT all agree" }
     );
     text

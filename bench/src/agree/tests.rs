@@ -15,7 +15,7 @@ fn case(name: &str) -> Case {
 }
 
 fn rendered(scene: &Scene, kind: IntegratorKind, seed: u64, spp: u32) -> Rendering {
-    let effort = Effort { pilot_spp: 16, aim: 1.0, required: 1.0, rays: 0.0, least_spp: spp };
+    let effort = Effort { pilot_spp: 16, aim: 1.0, required: 1.0, required_of_chains: 1.0, rays: 0.0, least_spp: spp };
     Task { scene, kind, size: (64, 48), max_depth: None, seed, threads: 2 }.run(&effort).unwrap()
 }
 
@@ -115,13 +115,14 @@ fn a_mean_that_is_not_known_well_enough_is_no_agreement() {
         spp: 16,
         seconds: 1.0,
         half_width,
+        required: 0.003,
         dropped: 0,
         comparison: None,
         verdict: report::Verdict::Agrees,
     };
-    assert!(Report::new(vec![row(0.002)], 0.003).passed);
+    assert!(Report::new(vec![row(0.002)]).passed);
     for half_width in [0.004, f64::NAN] {
-        let report = Report::new(vec![row(0.002), row(half_width)], 0.003);
+        let report = Report::new(vec![row(0.002), row(half_width)]);
         assert!(!report.passed && report.rows[1].verdict == report::Verdict::TooWide);
         assert!(table(&report).contains("TOO WIDE"));
     }
