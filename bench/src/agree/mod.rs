@@ -12,7 +12,7 @@ pub use report::{Report, table};
 
 use compare::{Comparison, compare};
 use picture::Picture;
-use render::{Effort, Rendering, Task};
+use render::{Effort, Limits, Rendering, Task};
 use renderer::integrator::IntegratorKind;
 use renderer::scene::Scene;
 use report::Row;
@@ -52,19 +52,17 @@ impl Budget {
         match self {
             Self::Quick => Effort {
                 pilot_spp: 32,
-                aim: 0.005,
-                required: 0.02,
-                required_of_chains: 0.25,
-                rays: 6e6,
                 least_spp: 256,
+                aim: 0.005,
+                samples: Limits { required: 0.02, rays: 6e6 },
+                chains: Limits { required: 0.25, rays: 6e6 },
             },
             Self::Full => Effort {
                 pilot_spp: 128,
-                aim: 0.002,
-                required: 0.003,
-                required_of_chains: 0.003,
-                rays: 400e6,
                 least_spp: 1024,
+                aim: 0.002,
+                samples: Limits { required: 0.003, rays: 1e9 },
+                chains: Limits { required: 0.003, rays: 3e8 },
             },
         }
     }
@@ -160,7 +158,7 @@ impl Session<'_> {
             spp: own.spp,
             seconds: own.seconds,
             half_width: Picture::Rendered(&own.image, kind).half_width(),
-            required: self.effort.required(kind),
+            required: self.effort.limits(kind).required,
             dropped: own.image.counters.non_finite + own.image.counters.negative,
             comparison,
             verdict: report::Verdict::Agrees,

@@ -17,20 +17,27 @@ pub struct Effort {
     pub pilot_spp: u32,
     /// Half width of the 99 % interval of the image mean to aim at, relative.
     pub aim: f64,
-    /// Half width that must be reached.
-    pub required: f64,
-    /// The same for Markov chains, whose image mean is that of their independent samples, and these are few.
-    pub required_of_chains: f64,
-    /// Most rays of a picture, unless it would then have fewer than `least_spp`.
-    pub rays: f64,
+    /// Limits of integrators that make independent samples.
+    pub samples: Limits,
+    /// Limits of Markov chains, whose image mean is that of the independent samples from which they start, and these are few.
+    pub chains: Limits,
     /// Samples that a pixel needs for its error to be told at all.
     pub least_spp: u32,
 }
 
+/// How far to go.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Half width that must be reached.
+    pub required: f64,
+    /// Most rays of a picture, unless it would then have fewer than the least number of samples.
+    pub rays: f64,
+}
+
 impl Effort {
-    /// Half width that an integrator must reach.
-    pub fn required(&self, kind: IntegratorKind) -> f64 {
-        if kind == IntegratorKind::Mmlt { self.required_of_chains } else { self.required }
+    /// The limits of an integrator.
+    pub fn limits(&self, kind: IntegratorKind) -> Limits {
+        if kind == IntegratorKind::Mmlt { self.chains } else { self.samples }
     }
 }
 
@@ -72,7 +79,7 @@ impl Task<'_> {
         let rays_per_spp = pilot.image.counters.rays as f64 / f64::from(effort.pilot_spp);
         let needed = f64::from(effort.pilot_spp) * (half / effort.aim) * (half / effort.aim);
         // NaN, where the pilot could not tell, takes all that is allowed.
-        let spp = needed.min(effort.rays / rays_per_spp.max(1.0)).max(f64::from(effort.least_spp));
+        let spp = needed.min(effort.limits(self.kind).rays / rays_per_spp.max(1.0)).max(f64::from(effort.least_spp));
         // Whole samples for each group.
         let groups = f64::from(SPLAT_GROUPS);
         self.render((spp / groups).ceil().min(1e6) as u32 * SPLAT_GROUPS, self.seed)

@@ -1,5 +1,5 @@
 use super::picture::Area;
-use super::render::{Effort, Rendering, Task};
+use super::render::{Effort, Limits, Rendering, Task};
 use super::*;
 use renderer::film::MergedImage;
 use renderer::integrator::IntegratorKind::{Light, Path};
@@ -15,7 +15,8 @@ fn case(name: &str) -> Case {
 }
 
 fn rendered(scene: &Scene, kind: IntegratorKind, seed: u64, spp: u32) -> Rendering {
-    let effort = Effort { pilot_spp: 16, aim: 1.0, required: 1.0, required_of_chains: 1.0, rays: 0.0, least_spp: spp };
+    let limits = Limits { required: 1.0, rays: 0.0 };
+    let effort = Effort { pilot_spp: 16, least_spp: spp, aim: 1.0, samples: limits, chains: limits };
     Task { scene, kind, size: (64, 48), max_depth: None, seed, threads: 2 }.run(&effort).unwrap()
 }
 
