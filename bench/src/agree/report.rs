@@ -118,9 +118,8 @@ pub fn table(report: &Report) -> String {
         };
         text += &format!("\n{}  {verdict}{}", figures(r), remarks(r));
     }
-    let seconds: f64 = report.rows.iter().map(|r| r.seconds).sum();
     text += &format!(
-        "\n{} tests, each at p >= {:.2e}; {seconds:.0} s of rendering: {}",
+        "\n{} tests, each at p >= {:.2e}: {}",
         report.tests,
         report.least_p,
         if report.passed { "all agree" } else { "NOT all agree" }
