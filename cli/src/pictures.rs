@@ -7,6 +7,7 @@ use crate::save;
 use renderer::film::exr::{self, Provenance};
 use renderer::film::{Counters, ErrorSummary, MergedImage, png};
 use renderer::integrator::IntegratorKind;
+use renderer::integrator::mmlt::ChainStats;
 use renderer::job::{LocalOutcome, RenderSettings};
 use renderer::scene::bundle::Digest;
 use serde::Serialize;
@@ -73,6 +74,7 @@ pub struct Summary {
     error: Option<ErrorSummary>,
     #[serde(flatten)]
     counters: Counters,
+    chains: ChainStats,
     exr: String,
     png: String,
 }
@@ -94,6 +96,7 @@ impl Summary {
             rays_per_s: image.counters.rays as f64 / seconds,
             error: image.error,
             counters: image.counters,
+            chains: outcome.chains,
             exr: saved.exr.display().to_string(),
             png: saved.png.display().to_string(),
         }
@@ -116,6 +119,16 @@ impl fmt::Display for Summary {
         }
         if self.interrupted {
             write!(f, ", interrupted")?;
+        }
+        let m = &self.chains;
+        if m.small + m.large > 0 {
+            let percent = |part: u64, all: u64| 100.0 * part as f64 / all.max(1) as f64;
+            let mutations = quantity((m.small + m.large) as f64);
+            let (small, large) = (percent(m.small_accepted, m.small), percent(m.large_accepted, m.large));
+            write!(
+                f,
+                ", {mutations} mutations ({small:.0} % of the small steps and {large:.0} % of the large ones accepted)"
+            )?;
         }
         let dropped = c.non_finite + c.negative;
         write!(f, ", {dropped} contributions dropped")?;

@@ -4,7 +4,7 @@
 
 use renderer::film::{Aov, Counters, SplatSums, TileSums};
 use renderer::integrator::IntegratorKind;
-use renderer::integrator::mmlt::{BootstrapSums, ChainStats};
+use renderer::integrator::mmlt::{BootstrapSums, ChainStats, Found};
 use renderer::job::{Merger, PassPlan, Planner, RenderOptions, RenderSettings, Sampling, Unit, UnitKind, UnitResult};
 use renderer::scene::desc::RenderDefaults;
 use renderer::spectrum::Rgb;
@@ -45,9 +45,19 @@ fn made_up(plan: &PassPlan, unit: &Unit) -> UnitResult {
             result.paths = end - start;
             result.light_sums = vec![f64::from(value(3)), 1.0 / 7.0];
         }
-        UnitKind::Bootstrap { edges, start, end } => {
-            let found: Vec<(u32, f32)> = (start..end).step_by(3).map(|i| (i, value(i as usize) + 0.1)).collect();
-            let techniques = (0..=edges).map(|s| f64::from(s) / 3.0).collect();
+        UnitKind::Bootstrap { start, end } => {
+            let depths = &plan.chains.as_ref().unwrap().depths;
+            let of_sample = |index: u32| {
+                depths.iter().map(move |d| Found {
+                    edges: d.edges,
+                    index,
+                    technique: index % (d.edges + 1),
+                    weight: value(index as usize) + 0.1,
+                    target: 2.0,
+                })
+            };
+            let found = (start..end).step_by(3).flat_map(of_sample).collect();
+            let techniques = depths.iter().map(|d| (0..=d.edges).map(|s| f64::from(s) / 3.0).collect()).collect();
             result.bootstrap = Some(BootstrapSums { found, techniques });
             result.splats = (plan.pass == 0).then(|| splats(plan, unit));
         }

@@ -70,7 +70,11 @@ fn longest(unit: &Unit, e: &Expected) -> u64 {
     let floats = match &unit.kind {
         UnitKind::Tile { rect, .. } => film + rect.area() as u64 * (3 + size_of::<Aov>() as u64 / 4),
         UnitKind::Paths { .. } | UnitKind::Chains { .. } => film,
-        UnitKind::Bootstrap { edges, start, end } => film + 2 * u64::from(end - start) + 2 * u64::from(*edges) + 2,
+        UnitKind::Bootstrap { start, end } => {
+            let depths = e.plan.chains.iter().flat_map(|c| &c.depths);
+            let (lengths, techniques) = depths.fold((0, 0), |(n, t), d| (n + 1, t + d.techniques.len() as u64 + 1));
+            film + 5 * lengths * u64::from(end - start) + 2 * techniques
+        }
     };
     1024 + 8 * u64::from(e.lights) + 4 * floats + 4 * floats / 250
 }

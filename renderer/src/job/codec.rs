@@ -2,11 +2,14 @@
 
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Aov, BLOCK, Counters, SplatSums, TileSums};
-use crate::integrator::mmlt::{BootstrapSums, ChainStats};
+use crate::integrator::mmlt::{BootstrapSums, ChainStats, Found};
 use crate::spectrum::Rgb;
+use std::ops::Range;
 
 const MAGIC: &[u8; 4] = b"LFU2";
 const BLOCK_FLOATS: usize = (BLOCK * BLOCK) as usize * 3;
+/// Edges of the longest path that chains carry, at most.
+const MAX_EDGES: u32 = 255;
 const AOV_FLOATS: usize = size_of::<Aov>() / 4;
 
 /// Bytes that are not the result of the unit asked for.
@@ -116,11 +119,14 @@ fn encode_chains(result: &UnitResult, out: &mut Vec<u8>) {
     out.push(u8::from(result.splats.is_some()));
     if let Some(b) = &result.bootstrap {
         out.extend((b.techniques.len() as u32).to_le_bytes());
-        b.techniques.iter().for_each(|v| out.extend(v.to_le_bytes()));
+        for sums in &b.techniques {
+            out.extend((sums.len() as u32).to_le_bytes());
+            sums.iter().for_each(|v| out.extend(v.to_le_bytes()));
+        }
         out.extend((b.found.len() as u32).to_le_bytes());
-        for (index, target) in &b.found {
-            out.extend(index.to_le_bytes());
-            out.extend(target.to_le_bytes());
+        for f in &b.found {
+            let words = [f.edges, f.index, f.technique, f.weight.to_bits(), f.target.to_bits()];
+            words.iter().for_each(|v| out.extend(v.to_le_bytes()));
         }
     }
     if let Some(c) = &result.chains {
@@ -139,28 +145,39 @@ fn decode_chains(r: &mut Reader, unit: &Unit) -> Result<(Option<BootstrapSums>, 
             let stats = ChainStats { small: next()?, small_accepted: next()?, large: next()?, large_accepted: next()? };
             Ok((None, Some(stats)))
         }
-        UnitKind::Bootstrap { edges, start, end } => {
-            let n = r.u32().ok_or_else(short)?;
-            if n != edges + 1 {
-                return Err(fail("the number of techniques does not fit the unit"));
-            }
-            let techniques =
-                (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>().ok_or_else(short)?;
-            let n = r.u32().ok_or_else(short)?;
-            if n > end - start {
-                return Err(fail("more paths found than there were samples"));
-            }
-            let found = (0..n).map(|_| Some((r.u32()?, f32::from_bits(r.u32()?)))).collect::<Option<Vec<_>>>();
-            let found = found.ok_or_else(short)?;
-            let fits =
-                |(index, target): &(u32, f32)| (start..end).contains(index) && *target > 0.0 && target.is_finite();
-            let sums_fit = techniques.iter().all(|v| v.is_finite() && *v >= 0.0);
-            if !found.iter().all(fits) || !found.is_sorted_by(|a, b| a.0 < b.0) || !sums_fit {
-                return Err(fail("a sample of the pool is out of range or out of order"));
-            }
-            Ok((Some(BootstrapSums { found, techniques }), None))
-        }
+        UnitKind::Bootstrap { start, end } => decode_bootstrap(r, start..end).map(|b| (Some(b), None)).map_err(fail),
     }
+}
+
+fn decode_bootstrap(r: &mut Reader, samples: Range<u32>) -> Result<BootstrapSums, &'static str> {
+    const SHORT: &str = "too short";
+    let lengths = r.u32().filter(|n| *n <= MAX_EDGES).ok_or("too many path lengths")?;
+    let mut techniques = Vec::new();
+    for _ in 0..lengths {
+        let n = r.u32().filter(|n| *n <= MAX_EDGES + 1).ok_or("too many techniques")?;
+        let sums = (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>().ok_or(SHORT)?;
+        if !sums.iter().all(|v| v.is_finite() && *v >= 0.0) {
+            return Err("the sum of a technique is not a finite, non-negative number");
+        }
+        techniques.push(sums);
+    }
+    let n = r.u32().ok_or(SHORT)?;
+    if u64::from(n) > u64::from(lengths) * u64::from(samples.end - samples.start) {
+        return Err("more paths found than there were samples");
+    }
+    let mut found: Vec<Found> = Vec::new();
+    for _ in 0..n {
+        let mut next = || r.u32().ok_or(SHORT);
+        let (edges, index, technique) = (next()?, next()?, next()?);
+        let (weight, target) = (f32::from_bits(next()?), f32::from_bits(next()?));
+        let sound = |v: f32| v > 0.0 && v.is_finite();
+        let in_order = found.last().is_none_or(|f| (f.index, f.edges) < (index, edges));
+        if !(samples.contains(&index) && technique <= edges && sound(weight) && sound(target) && in_order) {
+            return Err("a path of the pool is out of range or out of order");
+        }
+        found.push(Found { edges, index, technique, weight, target });
+    }
+    Ok(BootstrapSums { found, techniques })
 }
 
 /// Byte planes: all lowest bytes, then all second bytes, ...: exponents compress well side by side.

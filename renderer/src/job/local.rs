@@ -6,6 +6,7 @@ use super::run::{Stop, UnitError, run_unit};
 use super::settings::RenderSettings;
 use super::unit::UnitResult;
 use crate::film::MergedImage;
+use crate::integrator::mmlt::ChainStats;
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -32,6 +33,8 @@ pub enum LocalEvent<'a> {
 pub struct LocalOutcome {
     /// The image of everything that was finished.
     pub image: MergedImage,
+    /// How the mutations of a Metropolis job fared.
+    pub chains: ChainStats,
     /// Whether it was stopped before its budget.
     pub interrupted: bool,
 }
@@ -50,12 +53,16 @@ pub fn render_local(
         let plan = merger.plan().clone();
         run_pass(scene, settings, options, &plan, stop, &mut merger, observer)?;
         if stop.stopped() && !merger.pass_complete() {
-            return Ok(LocalOutcome { image: merger.image(), interrupted: true });
+            return Ok(LocalOutcome { image: merger.image(), chains: merger.chain_stats(), interrupted: true });
         }
         observer(LocalEvent::PassDone(&merger));
         let time_up = settings.budget.time_s.is_some_and(|t| started.elapsed().as_secs_f64() >= t);
         if merger.advance(time_up || stop.stopped()).is_none() {
-            return Ok(LocalOutcome { image: merger.image(), interrupted: stop.stopped() });
+            return Ok(LocalOutcome {
+                image: merger.image(),
+                chains: merger.chain_stats(),
+                interrupted: stop.stopped(),
+            });
         }
     }
 }

@@ -141,8 +141,9 @@ impl Merger {
                 self.light_sums.resize(self.light_sums.len().max(result.light_sums.len()), 0.0);
                 self.light_sums.iter_mut().zip(&result.light_sums).for_each(|(to, from)| *to += from);
             }
-            (UnitKind::Bootstrap { edges, .. }, None, splats) if splats.as_ref().is_none_or(fits) => {
-                self.metropolis.add_bootstrap(&self.settings, &self.plan, id, *edges, result);
+            (UnitKind::Bootstrap { .. }, None, splats) if splats.as_ref().is_none_or(fits) => {
+                let added = self.metropolis.add_bootstrap(&self.settings, &self.plan, unit.replicate, result);
+                added.ok_or(FoldError::Mismatch(id))?;
             }
             (UnitKind::Chains { part, .. }, None, Some(splats)) if fits(splats) => {
                 let Some(Part::Chains { b, starts, mutations, .. }) = self.plan.parts.get(*part as usize) else {

@@ -14,29 +14,35 @@ use super::plan::{GroupRange, Part, PassPlan, Sampling};
 use super::settings::RenderSettings;
 use super::unit::UnitResult;
 use crate::film::{GroupFilm, SplatSums};
-use crate::integrator::mmlt::{BootstrapSums, ChainConstants, ChainStart, Depth, TARGET_CELL};
+use crate::integrator::mmlt::{ChainConstants, ChainStart, Depth, TARGET_CELL};
 use crate::math::pow64;
 use crate::sampling::{IndependentSampler, Sampler};
 use std::collections::BTreeMap;
 
 /// Names the random starts of a pool among all hashes.
 const STARTS: u64 = 0x7374_6172_7473;
-/// Shares of the mutations that pilot and pools may take.
+/// Share of the work that the pilot may take.
 const PILOT_SHARE: f64 = 0.02;
-const POOL_SHARE: f64 = 0.08;
+/// Samples of a pilot, at least.
+const MIN_PILOT: f64 = 2048.0;
+/// Samples of a pool, at least.
+const MIN_POOL: f64 = 256.0;
+/// Edges of the path of a typical mutation, and up to which walks of a pool's samples typically last.
+const TYPICAL_EDGES: f64 = 5.0;
+const TYPICAL_LONGEST: f64 = 16.0;
+/// Paths of a pool's sample below this share of the mean target are left to chance.
+const THRESHOLD_SHARE: f64 = 0.02;
 /// Samples of the pools of a pass, all groups and lengths together: bounds the coordinator's memory.
-const MAX_POOLS: f64 = (1 << 24) as f64;
-/// Edges up to which ordinary samples carry the light: emission and direct light.
-pub const DIRECT_EDGES: u32 = 2;
+const MAX_POOLS: f64 = (1 << 20) as f64;
 /// Edges of the longest path of chains when the depth is unbounded.
 const LONGEST_UNBOUNDED: u32 = 32;
 /// Mutations per pixel of the first pass of chains of a job that time or error ends.
 const FIRST_PASS: u32 = 16;
 
-/// The path lengths that chains carry: 3 edges and more.
+/// The path lengths that chains carry: beyond emission and direct light.
 pub fn lengths(settings: &RenderSettings) -> std::ops::RangeInclusive<u32> {
     let longest = settings.mmlt.longest;
-    3..=settings.max_depth.map_or(longest.min(LONGEST_UNBOUNDED), |n| n.min(longest))
+    settings.mmlt.direct_edges + 1..=settings.max_depth.map_or(longest.min(LONGEST_UNBOUNDED), |n| n.min(longest))
 }
 
 /// A pool of one replicate and path length.
@@ -44,8 +50,8 @@ pub fn lengths(settings: &RenderSettings) -> std::ops::RangeInclusive<u32> {
 pub struct Pool {
     /// Number of samples.
     pub samples: u32,
-    /// Those that found a path: index and target.
-    pub found: Vec<(u32, f32)>,
+    /// What they found, by sample: start and weight.
+    pub found: Vec<(ChainStart, f32)>,
 }
 
 impl Pool {
@@ -55,21 +61,21 @@ impl Pool {
         if self.samples == 0 { 0.0 } else { sum / f64::from(self.samples) }
     }
 
-    /// `n` starts by systematic resampling: the expected number of starts at a sample is proportional to its target.
+    /// `n` starts by systematic resampling: the expected number of starts at a sample is proportional to its weight.
     fn starts(&self, n: u32, u: f32) -> Vec<ChainStart> {
         let total: f64 = self.found.iter().map(|f| f64::from(f.1)).sum();
         let mut starts = Vec::with_capacity(n as usize);
         let (mut sum, mut next) = (0.0, f64::from(u));
-        for (index, target) in &self.found {
-            sum += f64::from(*target) / total * f64::from(n);
+        for (start, weight) in &self.found {
+            sum += f64::from(*weight) / total * f64::from(n);
             while next < sum && starts.len() < n as usize {
-                starts.push(ChainStart(*index, *target));
+                starts.push(*start);
                 next += 1.0;
             }
         }
         // Rounding may leave the last one out.
-        if let Some((index, target)) = self.found.last() {
-            starts.resize(n as usize, ChainStart(*index, *target));
+        if let Some((start, _)) = self.found.last() {
+            starts.resize(n as usize, *start);
         }
         starts
     }
@@ -91,17 +97,22 @@ pub struct Metropolis {
 /// The pilot's plan.
 pub fn pilot(settings: &RenderSettings) -> PassPlan {
     let lengths: Vec<u32> = lengths(settings).collect();
-    let mutations = f64::from(first_mutations(settings)) * pixels(settings);
-    // Short paths matter more: their shares fall with their length.
-    let shares: f64 = lengths.iter().map(|k| 1.0 / f64::from(*k)).sum();
-    let parts = lengths.iter().map(|k| {
-        let samples = (PILOT_SHARE * mutations / f64::from(*k) / shares).clamp(1024.0, f64::from(1 << 22)) as u32;
-        Part::Bootstrap { replicate: 0, edges: *k, samples }
-    });
+    let samples =
+        pool_samples(settings, PILOT_SHARE, first_mutations(settings)).clamp(MIN_PILOT, f64::from(1 << 22)) as u32;
     let first = GroupRange { replicate: 0, start: 0, end: 1, closes: false };
+    let parts = vec![Part::Samples(first), Part::Bootstrap { replicate: 0, samples }];
     let depths = lengths.iter().map(|k| Depth { edges: *k, techniques: vec![1.0; *k as usize + 1] }).collect();
-    let chains = ChainConstants { depths, columns: settings.width.div_ceil(TARGET_CELL), target: Vec::new() };
-    plan(settings, 0, std::iter::once(Part::Samples(first)).chain(parts).collect(), chains, 0, false)
+    let columns = settings.width.div_ceil(TARGET_CELL);
+    let chains = ChainConstants { depths, columns, target: Vec::new(), threshold: 0.0 };
+    plan(settings, 0, parts, chains, 0, false)
+}
+
+/// Pool samples that cost the given share of so many mutations per pixel. A sample traces both walks, and a path of every length in
+/// about every second way; a mutation, one path of a short length.
+fn pool_samples(settings: &RenderSettings, share: f64, mpp: u32) -> f64 {
+    let longest = f64::from(*lengths(settings).end()).min(TYPICAL_LONGEST);
+    let cost = (2.0 * longest + 0.25 * longest * longest) / TYPICAL_EDGES;
+    share * f64::from(mpp) * pixels(settings) / cost
 }
 
 fn pixels(settings: &RenderSettings) -> f64 {
@@ -141,45 +152,50 @@ fn plan(
 }
 
 impl Metropolis {
-    /// Takes in a bootstrap unit of a pass.
+    /// Takes in a bootstrap unit of a pass; `None` when it does not fit.
     pub fn add_bootstrap(
         &mut self,
         settings: &RenderSettings,
         plan: &PassPlan,
-        id: u32,
-        edges: u32,
+        replicate: u32,
         result: &UnitResult,
-    ) {
-        let (Some(unit), Some(sums)) = (plan.unit(id), &result.bootstrap) else { return };
-        let of_part = |p: &&Part| matches!(p, Part::Bootstrap { replicate, edges: k, .. } if *replicate == unit.replicate && *k == edges);
-        let Some(Part::Bootstrap { samples, .. }) = plan.parts.iter().find(of_part) else { return };
-        if plan.pass > 0 {
-            let pool = self.pools.entry((unit.replicate, edges)).or_default();
-            pool.samples = *samples;
-            pool.found.extend_from_slice(&sums.found);
-            return;
+    ) -> Option<()> {
+        let sums = result.bootstrap.as_ref()?;
+        let samples = plan.parts.iter().find_map(|p| match p {
+            Part::Bootstrap { replicate: r, samples } if *r == replicate => Some(*samples),
+            _ => None,
+        })?;
+        let chains = plan.chains.as_ref()?;
+        let fits = sums.techniques.len() == chains.depths.len()
+            && sums.techniques.iter().zip(&chains.depths).all(|(t, d)| t.len() == d.techniques.len())
+            && sums.found.iter().all(|f| chains.depth(f.edges).is_some());
+        if !fits {
+            return None;
         }
-        self.add_pilot(settings, edges, f64::from(*samples), sums, result);
-    }
-
-    fn add_pilot(
-        &mut self,
-        settings: &RenderSettings,
-        edges: u32,
-        samples: f64,
-        sums: &BootstrapSums,
-        result: &UnitResult,
-    ) {
-        let totals = self.techniques.entry(edges).or_insert_with(|| vec![0.0; sums.techniques.len()]);
-        totals.iter_mut().zip(&sums.techniques).for_each(|(to, from)| *to += from / samples);
+        if plan.pass > 0 {
+            for depth in &chains.depths {
+                self.pools.entry((replicate, depth.edges)).or_default().samples = samples;
+            }
+            for f in &sums.found {
+                let start = ChainStart(f.index, f.technique, f.target);
+                self.pools.entry((replicate, f.edges)).or_default().found.push((start, f.weight));
+            }
+            return Some(());
+        }
+        // The pilot.
+        for (depth, sums) in chains.depths.iter().zip(&sums.techniques) {
+            let totals = self.techniques.entry(depth.edges).or_insert_with(|| vec![0.0; sums.len()]);
+            totals.iter_mut().zip(sums).for_each(|(to, from)| *to += from / f64::from(samples));
+        }
         if let Some(splats) = &result.splats {
             let width = settings.width as usize;
             self.pilot.resize(width * settings.height as usize, [0.0; 3]);
             for (x, y, v) in splats.pixels() {
                 let to = &mut self.pilot[y as usize * width + x as usize];
-                (0..3).for_each(|c| to[c] += v[c] / samples);
+                (0..3).for_each(|c| to[c] += v[c] / f64::from(samples));
             }
         }
+        Some(())
     }
 
     /// The pass after `before`, which is complete, at `done` mutations per pixel in all. `direct` is the picture of what ordinary samples
@@ -194,7 +210,7 @@ impl Metropolis {
         let pass = before.pass + 1;
         if pass == 1 {
             let chains = self.learn(settings, direct);
-            let parts = self.pools_of(settings, &chains, first_mutations(settings));
+            let parts = Self::pools_of(settings, first_mutations(settings));
             return Some(plan(settings, pass, parts, chains, 0, false));
         }
         let chains = before.chains.clone()?;
@@ -213,7 +229,7 @@ impl Metropolis {
         let mut parts = self.chains_of(settings, pass, size, done, last && fixed_budget(settings).is_some());
         self.pools.clear();
         if !last {
-            parts.extend(self.pools_of(settings, &chains, ((done + size) / 10).max(FIRST_PASS)));
+            parts.extend(Self::pools_of(settings, ((done + size) / 10).max(FIRST_PASS)));
         }
         Some(plan(settings, pass, parts, chains, size, last))
     }
@@ -225,13 +241,15 @@ impl Metropolis {
             let sums = self.techniques.get(&edges).cloned().unwrap_or_default();
             let total: f64 = sums.iter().sum();
             let learned = settings.mmlt.learn && total > 0.0 && sums.len() == n;
-            // A third for all techniques alike: what the pilot missed keeps its chance.
-            let share = |s: usize| (1.0 / 3.0 / n as f64 + 2.0 / 3.0 * sums[s] / total) as f32;
+            // A fifth for all techniques alike: what the pilot missed keeps its chance.
+            let share = |s: usize| (0.2 / n as f64 + 0.8 * sums[s] / total) as f32;
             Depth { edges, techniques: (0..n).map(|s| if learned { share(s) } else { 1.0 }).collect() }
         });
         let depths = depths.collect();
         let (columns, target) = self.target_map(settings, direct);
-        ChainConstants { depths, columns, target }
+        let b: f64 = self.techniques.values().flatten().sum();
+        // The target map's factors are about one for what the picture consists of.
+        ChainConstants { depths, columns, target, threshold: (THRESHOLD_SHARE * b) as f32 }
     }
 
     /// `(I^2 + 0.01)^(-lift / 2)` by cell, I being the mean of what the pilot saw in and around the cell.
@@ -268,29 +286,18 @@ impl Metropolis {
     }
 
     /// The pools for a pass of `mpp` mutations per pixel.
-    fn pools_of(&self, settings: &RenderSettings, chains: &ChainConstants, mpp: u32) -> Vec<Part> {
-        let budget = (POOL_SHARE * f64::from(mpp) * pixels(settings)).min(MAX_POOLS) / f64::from(settings.replicates);
-        // Half of it by what the pilot found, half by length.
-        let inverse: f64 = chains.depths.iter().map(|d| 1.0 / f64::from(d.edges)).sum();
-        let found = |edges: u32| self.techniques.get(&edges).map_or(0.0, |t| t.iter().sum::<f64>());
-        let total: f64 = chains.depths.iter().map(|d| found(d.edges)).sum();
-        let samples = |edges: u32| {
-            let by_length = 1.0 / f64::from(edges) / inverse;
-            let by_light = if total > 0.0 { found(edges) / total } else { by_length };
-            (budget * 0.5 * (by_length + by_light)).clamp(256.0, f64::from(1 << 24)) as u32
-        };
-        let groups = 0..settings.replicates;
-        let lengths = |r| chains.depths.iter().map(move |d| (r, d.edges));
-        groups
-            .flat_map(lengths)
-            .map(|(replicate, edges)| Part::Bootstrap { replicate, edges, samples: samples(edges) })
-            .collect()
+    fn pools_of(settings: &RenderSettings, mpp: u32) -> Vec<Part> {
+        let samples = pool_samples(settings, f64::from(settings.mmlt.pool_share), mpp).min(MAX_POOLS)
+            / f64::from(settings.replicates);
+        let samples = samples.max(MIN_POOL) as u32;
+        (0..settings.replicates).map(|replicate| Part::Bootstrap { replicate, samples }).collect()
     }
 
     /// The chains of a pass of `mpp` mutations per pixel, and its ordinary samples, group after group.
     fn chains_of(&self, settings: &RenderSettings, pass: u32, mpp: u32, done: u32, closes: bool) -> Vec<Part> {
         let groups = f64::from(settings.replicates);
-        let budget = f64::from(mpp) * pixels(settings) * (1.0 - PILOT_SHARE - POOL_SHARE) / groups;
+        let budget =
+            f64::from(mpp) * pixels(settings) * (1.0 - PILOT_SHARE - f64::from(settings.mmlt.pool_share)) / groups;
         let lengths: Vec<u32> = lengths(settings).collect();
         // Mutations by what a length contributes, over the root of what one costs; a tenth for all alike.
         let mean_b = |edges: u32| {
@@ -373,9 +380,9 @@ impl Metropolis {
         for ((replicate, edges), pool) in &self.pools {
             [*replicate, *edges, pool.samples].iter().for_each(|v| out.extend(u64::from(*v).to_le_bytes()));
             out.extend((pool.found.len() as u64).to_le_bytes());
-            for (index, target) in &pool.found {
-                out.extend(index.to_le_bytes());
-                out.extend(target.to_le_bytes());
+            for (ChainStart(index, technique, target), weight) in &pool.found {
+                let words = [*index, *technique, target.to_bits(), weight.to_bits()];
+                words.iter().for_each(|v| out.extend(v.to_le_bytes()));
             }
         }
     }
@@ -400,12 +407,12 @@ impl Metropolis {
             let mut number = || u32::try_from(r.length()?).ok();
             let (key, samples) = ((number()?, number()?), number()?);
             let raw = r.length()?;
-            let raw = r.take(raw.checked_mul(8)?)?;
+            let raw = r.take(raw.checked_mul(16)?)?;
             let entry = |b: &[u8]| {
-                let word: u64 = bytemuck::pod_read_unaligned(b);
-                (word as u32, f32::from_bits((word >> 32) as u32))
+                let [index, technique, target, weight]: [u32; 4] = bytemuck::pod_read_unaligned(b);
+                (ChainStart(index, technique, f32::from_bits(target)), f32::from_bits(weight))
             };
-            pools.insert(key, Pool { samples, found: raw.chunks_exact(8).map(entry).collect() });
+            pools.insert(key, Pool { samples, found: raw.chunks_exact(16).map(entry).collect() });
         }
         *bytes = r.0;
         Some(Self { pilot, techniques, pools, pending })

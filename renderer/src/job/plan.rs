@@ -12,7 +12,7 @@ const UNIT_SAMPLES: u64 = 1 << 16;
 /// Most samples of a pixel in a unit.
 const SAMPLE_CHUNK: u32 = 256;
 /// Bootstrap samples of a unit.
-const UNIT_BOOTSTRAP: u32 = 1 << 15;
+const UNIT_BOOTSTRAP: u32 = 1 << 12;
 /// Mutations that a unit of chains aims at.
 const UNIT_MUTATIONS: u64 = 1 << 18;
 /// Most samples per pixel of a job.
@@ -50,12 +50,10 @@ pub enum Sampling {
 pub enum Part {
     /// Ordinary samples.
     Samples(GroupRange),
-    /// Independent samples of one path length: the pool from which chains start.
+    /// Independent samples: the pool from which chains start.
     Bootstrap {
         /// The group.
         replicate: u32,
-        /// Edges of the paths.
-        edges: u32,
         /// Number of samples.
         samples: u32,
     },
@@ -219,9 +217,9 @@ impl PassPlan {
                 let start = g.start + chunk * SAMPLE_CHUNK;
                 UnitKind::Tile { rect, start, end: (start + SAMPLE_CHUNK).min(g.end) }
             }
-            Part::Bootstrap { edges, samples, .. } => {
+            Part::Bootstrap { samples, .. } => {
                 let start = i as u32 * UNIT_BOOTSTRAP;
-                UnitKind::Bootstrap { edges: *edges, start, end: (start + UNIT_BOOTSTRAP).min(*samples) }
+                UnitKind::Bootstrap { start, end: (start + UNIT_BOOTSTRAP).min(*samples) }
             }
             Part::Chains { starts, mutations, .. } => {
                 let chains = self.unit_chains(*mutations);

@@ -1,4 +1,4 @@
-use super::metropolis::{self, DIRECT_EDGES};
+use super::metropolis;
 use super::plan::{Part, PassPlan, Sampling};
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind, UnitResult};
@@ -116,14 +116,13 @@ fn run(
             result.splats = Some(splats);
             !(context.stopped)()
         }
-        UnitKind::Bootstrap { edges, start, end } => {
+        UnitKind::Bootstrap { start, end } => {
             let Some(constants) = &plan.chains else { return Ok(None) };
             // The pilot's samples are a preview.
             let mut splats = (plan.pass == 0).then(|| SplatSums::new(settings.width, settings.height));
             let (splat, counters) = (splats.as_mut(), &mut result.counters);
-            let at = (plan.pass, edges);
             result.bootstrap =
-                mmlt::run_bootstrap(&context, constants, &settings.mmlt, at, start..end, splat, counters);
+                mmlt::run_bootstrap(&context, constants, &settings.mmlt, plan.pass, start..end, splat, counters);
             result.splats = splats;
             result.bootstrap.is_some()
         }
@@ -176,7 +175,8 @@ fn depths(settings: &RenderSettings) -> (u32, Carried) {
         return (all, Carried::ALL);
     }
     let longest = *metropolis::lengths(settings).end();
-    let carried = Carried { up_to: DIRECT_EDGES, beyond: longest.max(DIRECT_EDGES) };
+    let direct = settings.mmlt.direct_edges;
+    let carried = Carried { up_to: direct, beyond: longest.max(direct) };
     // Where chains carry all that is longer, ordinary walks end early.
-    (if all <= longest { all.min(DIRECT_EDGES) } else { all }, carried)
+    (if all <= longest { all.min(direct) } else { all }, carried)
 }

@@ -36,10 +36,8 @@ pub enum UnitKind {
         /// One past the last.
         end: u64,
     },
-    /// Independent samples `start..end` of paths of one length.
+    /// Samples `start..end` of the replicate's pool.
     Bootstrap {
-        /// Edges of the paths.
-        edges: u32,
         /// First sample.
         start: u32,
         /// One past the last.

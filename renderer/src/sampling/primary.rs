@@ -7,10 +7,15 @@ use crate::math::Vec2;
 
 /// Coordinates of a fixed block that belongs to one vertex of a walk: {lobe, direction, direction, distance}.
 const VERTEX_BLOCK: usize = 4;
+/// From one vertex of a walk to the next: the walks from camera and light take turns, so that no place depends on their lengths.
+const STRIDE: usize = 2 * VERTEX_BLOCK;
 /// The light's block: {choice, point, point, direction, direction}, and what is left of it.
 const START_BLOCK: usize = 8;
 /// Coordinates before those of the walks: technique, raster, lens, connection.
 const FIRST_WALK: usize = 8;
+
+/// The coordinate of the technique.
+const TECHNIQUE: usize = 0;
 
 /// Where the numbers of a path lie. Blocks are fixed, so that what one vertex needs does not shift the numbers of another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,15 +83,12 @@ pub struct PrimarySpace {
     mutation: u32,
     key: u64,
     large: bool,
-    camera_base: usize,
 }
 
 impl PrimarySpace {
     /// For paths of at most `edges` edges.
     pub fn new(edges: usize) -> Self {
-        let light_base = FIRST_WALK;
-        let camera_base = light_base + START_BLOCK + VERTEX_BLOCK * edges;
-        let n = camera_base + VERTEX_BLOCK * (edges + 1);
+        let n = FIRST_WALK + START_BLOCK + STRIDE * (edges + 1);
         Self {
             current: vec![Coordinate::default(); n],
             proposed: vec![0.0; n],
@@ -98,7 +100,6 @@ impl PrimarySpace {
             mutation: 0,
             key: 0,
             large: false,
-            camera_base,
         }
     }
 
@@ -126,6 +127,16 @@ impl PrimarySpace {
         self.large = large;
     }
 
+    /// Gives the proposal's technique, in place of the number that its key gives.
+    #[inline]
+    pub fn set_technique(&mut self, value: f32) {
+        self.proposed[TECHNIQUE] = value;
+        if self.drawn_at[TECHNIQUE] != self.mutation {
+            self.drawn_at[TECHNIQUE] = self.mutation;
+            self.touched.push(TECHNIQUE as u32);
+        }
+    }
+
     /// Whether the proposal under way is independent of the current point.
     #[inline]
     pub fn is_large(&self) -> bool {
@@ -148,20 +159,14 @@ impl PrimarySpace {
     /// Numbers of the proposal.
     #[inline]
     pub fn stream<'a>(&'a mut self, stream: Stream, sizes: &'a StepSizes) -> PrimaryStream<'a> {
-        let at = match stream {
-            Stream::Technique => 0,
-            Stream::Lens => 1,
-            Stream::Connection => 5,
-            Stream::Light => FIRST_WALK,
-            Stream::Camera => self.camera_base,
+        let (at, walk) = match stream {
+            Stream::Technique => (TECHNIQUE, 0),
+            Stream::Lens => (1, 0),
+            Stream::Connection => (5, 0),
+            Stream::Light => (FIRST_WALK, FIRST_WALK + START_BLOCK),
+            Stream::Camera => (FIRST_WALK, FIRST_WALK + START_BLOCK + VERTEX_BLOCK),
         };
-        PrimaryStream {
-            space: self,
-            sizes,
-            base: at,
-            walk_start: if stream == Stream::Light { START_BLOCK } else { 0 },
-            at,
-        }
+        PrimaryStream { space: self, sizes, start: at, walk, at }
     }
 
     #[inline]
@@ -205,8 +210,10 @@ fn uniform(key: u64, i: usize) -> f32 {
 pub struct PrimaryStream<'a> {
     space: &'a mut PrimarySpace,
     sizes: &'a StepSizes,
-    base: usize,
-    walk_start: usize,
+    /// The block of a walk's start.
+    start: usize,
+    /// The block of its first vertex after that.
+    walk: usize,
     at: usize,
 }
 
@@ -226,8 +233,8 @@ impl Sampler for PrimaryStream<'_> {
     #[inline]
     fn start_vertex(&mut self, vertex: u32) {
         self.at = match vertex {
-            0 => self.base,
-            v => self.base + self.walk_start + VERTEX_BLOCK * (v as usize - 1),
+            0 => self.start,
+            v => self.walk + STRIDE * (v as usize - 1),
         };
     }
 }

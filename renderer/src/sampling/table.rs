@@ -59,6 +59,15 @@ impl Discrete {
         ((self.cumulative[index + 1] - self.cumulative[index]) / self.total()) as f32
     }
 
+    /// A number by which [`Discrete::sample`] draws `index`, which must have a weight; uniform among them for a uniform `rest`.
+    pub fn locate(&self, index: usize, rest: f32) -> f32 {
+        let (low, high) = (self.cumulative[index], self.cumulative[index + 1]);
+        let at = |rest: f64| ((low + (high - low) * rest) / self.total()) as f32;
+        let u = at(f64::from(rest));
+        // Rounding may lead into a neighbour.
+        if self.sample(u).index == index { u } else { at(0.5) }
+    }
+
     /// Draws an entry by `u` in [0, 1).
     #[inline]
     pub fn sample(&self, u: f32) -> Choice {

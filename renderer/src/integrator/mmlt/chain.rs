@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 /// Names the mutations of chains among all hashes.
 const CHAIN: u64 = 0x0063_6861_696e;
 
-/// Where a chain starts: a sample of its pool, and the target that was found there.
+/// Where a chain starts: a sample of its pool, the technique of the path it found, and the target of that path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ChainStart(pub u32, pub f32);
+pub struct ChainStart(pub u32, pub u32, pub f32);
 
 /// Some chains of one path length and replicate.
 #[derive(Clone, Copy, Debug)]
@@ -96,10 +96,10 @@ pub fn run_chains(
     for (i, start) in (task.first..).zip(task.starts) {
         // Replay the start.
         let mut space = PrimarySpace::new(task.edges as usize);
-        space.propose_large(sample_key(c.seed, task.pool, c.replicate, task.edges, start.0));
-        let current = evaluator.evaluate(&mut space);
-        if current.target.to_bits() != start.1.to_bits() {
-            return Err(Mismatch { edges: task.edges, index: start.0, expected: start.1, found: current.target });
+        let key = sample_key(c.seed, task.pool, c.replicate, start.0);
+        let current = evaluator.replay(&mut space, key, start.1);
+        if current.target.to_bits() != start.2.to_bits() || current.technique != start.1 {
+            return Err(Mismatch { edges: task.edges, index: start.0, expected: start.2, found: current.target });
         }
         space.accept();
         let key =

@@ -1,4 +1,7 @@
+use crate::math::Vec2;
+use crate::sampling::Discrete;
 use crate::scene::Scene;
+use crate::spectrum::Rgb;
 use serde::{Deserialize, Serialize};
 
 /// Side of a cell of the target map in pixels.
@@ -24,6 +27,10 @@ pub struct MmltOptions {
     pub chain_length: u32,
     /// Ordinary samples of emission and direct light, for each mutation.
     pub direct_share: f32,
+    /// Share of the work that goes into pools.
+    pub pool_share: f32,
+    /// Edges of the longest path that ordinary samples carry.
+    pub direct_edges: u32,
     /// Edges of the longest path that chains carry; ordinary samples carry the rest.
     pub longest: u32,
 }
@@ -39,13 +46,16 @@ impl Default for MmltOptions {
             learn: true,
             chain_length: 8192,
             direct_share: 0.25,
-            longest: 24,
+            pool_share: 0.1,
+            direct_edges: 2,
+            longest: 64,
         }
     }
 }
 
 impl MmltOptions {
-    /// The method as published: no weights for large steps, luminance as the target, techniques alike, few long chains.
+    /// The method as published: no weights for large steps, luminance as the target, techniques alike, few long chains, all light by
+    /// chains.
     pub const PLAIN: Self = Self {
         large_step: 0.3,
         step_min: 1.0 / 1024.0,
@@ -55,7 +65,9 @@ impl MmltOptions {
         learn: false,
         chain_length: 1 << 18,
         direct_share: 0.25,
-        longest: 24,
+        pool_share: 0.1,
+        direct_edges: 0,
+        longest: 64,
     };
 
     /// Checks what came from a user or over the wire.
@@ -72,6 +84,12 @@ impl MmltOptions {
         }
         if !(self.direct_share > 0.0 && self.direct_share <= 100.0) {
             return fail("direct_share must lie between 0 and 100");
+        }
+        if !(self.pool_share > 0.0 && self.pool_share <= 0.9) {
+            return fail("pool_share must lie between 0 and 0.9");
+        }
+        if self.direct_edges > 2 {
+            return fail("direct_edges goes from 0 to 2");
         }
         if !(1..=1 << 24).contains(&self.chain_length) || !(2..=255).contains(&self.longest) {
             return fail("chain_length must lie between 1 and 16777216, longest between 2 and 255");
@@ -127,6 +145,8 @@ pub struct ChainConstants {
     pub columns: u32,
     /// Factor of the target by cell, row by row; empty = 1 everywhere.
     pub target: Vec<f32>,
+    /// Samples of pools leave it to chance whether paths whose share of the target is below this are tested for visibility.
+    pub threshold: f32,
 }
 
 impl ChainConstants {
@@ -135,9 +155,19 @@ impl ChainConstants {
         self.depths.iter().find(|d| d.edges == edges)
     }
 
+    /// What a chain's density is proportional to at a path: 0 outside the picture and where the value is none.
+    #[inline]
+    pub fn target_of(&self, value: Rgb, raster: Vec2, size: Vec2) -> f32 {
+        if !(raster.x >= 0.0 && raster.y >= 0.0 && raster.x < size.x && raster.y < size.y) {
+            return 0.0;
+        }
+        let target = value.luminance() * self.target_at(raster.x, raster.y);
+        if target > 0.0 && target.is_finite() { target } else { 0.0 }
+    }
+
     /// Factor of the target at a raster position.
     #[inline]
-    pub fn target_at(&self, x: f32, y: f32) -> f32 {
+    fn target_at(&self, x: f32, y: f32) -> f32 {
         if self.target.is_empty() {
             return 1.0;
         }
@@ -149,8 +179,16 @@ impl ChainConstants {
     }
 }
 
-/// The techniques by which paths of `edges` edges can be made in a scene: 1 for those that can, 0 for those that can't.
-pub fn allowed_techniques(scene: &Scene, edges: u32) -> Vec<f32> {
-    let hittable = scene.lights.iter().any(|l| !l.flags().is_delta());
-    (0..=edges).map(|s| f32::from(u8::from(s > 0 || hittable))).collect()
+/// Whether the technique with s vertices from the light can make any path in a scene.
+fn possible(scene: &Scene, s: usize) -> bool {
+    s > 0 || scene.lights.iter().any(|l| !l.flags().is_delta())
+}
+
+impl Depth {
+    /// The probabilities of the techniques that can make a path in the scene; `None` when there are none.
+    pub fn table(&self, scene: &Scene) -> Option<Discrete> {
+        let weights = self.techniques.iter().enumerate().map(|(s, w)| if possible(scene, s) { *w } else { 0.0 });
+        let weights: Vec<f32> = weights.collect();
+        (weights.len() == self.edges as usize + 1).then(|| Discrete::new(&weights)).flatten()
+    }
 }

@@ -35,10 +35,7 @@ pub struct Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     /// For paths of `edges` edges; `None` when no technique makes any.
     pub fn new(c: &UnitContext<'a>, constants: &'a ChainConstants, options: &MmltOptions, edges: u32) -> Option<Self> {
-        let depth = constants.depth(edges)?;
-        if depth.techniques.len() != edges as usize + 1 {
-            return None;
-        }
+        let techniques = constants.depth(edges)?.table(c.scene)?;
         Some(Self {
             tracer: Tracer {
                 scene: c.scene,
@@ -51,11 +48,21 @@ impl<'a> Evaluator<'a> {
             constants,
             size: Vec2::new(c.view.width as f32, c.view.height as f32),
             edges: edges as usize,
-            techniques: Discrete::new(&depth.techniques)?,
+            techniques,
             sizes: StepSizes::new(f64::from(options.step_min), f64::from(options.step_max)),
             camera: Subpath::default(),
             light: Subpath::default(),
         })
+    }
+
+    /// Proposes the path that a pool's sample found with s vertices from the light.
+    pub fn replay(&mut self, space: &mut PrimarySpace, key: u64, s: u32) -> Proposal {
+        space.propose_large(key);
+        if s as usize <= self.edges {
+            let rest = space.stream(Stream::Technique, &self.sizes).next_1d();
+            space.set_technique(self.techniques.locate(s as usize, rest));
+        }
+        self.evaluate(space)
     }
 
     /// The path of the space's proposal.
@@ -65,15 +72,11 @@ impl<'a> Evaluator<'a> {
         let mut proposal = Proposal { value: Rgb::ZERO, target: 0.0, raster: Vec2::ZERO, technique: s as u32 };
         let Some((value, raster)) = self.path(space, s) else { return proposal };
         let value = value / choice.pmf;
-        let inside = raster.x >= 0.0 && raster.y >= 0.0 && raster.x < self.size.x && raster.y < self.size.y;
-        if !inside || !self.tracer.counters.admit(value) {
-            return proposal;
+        if self.tracer.counters.admit(value) {
+            proposal.target = self.constants.target_of(value, raster, self.size);
         }
-        let target = value.luminance() * self.constants.target_at(raster.x, raster.y);
-        if target > 0.0 && target.is_finite() {
-            proposal.value = value;
-            proposal.raster = raster;
-            proposal.target = target;
+        if proposal.target > 0.0 {
+            (proposal.value, proposal.raster) = (value, raster);
         }
         proposal
     }

@@ -9,6 +9,7 @@
 //! * the technique is chosen with probabilities learned from the pilot;
 //! * what a large step finds is combined with the chain by the balance heuristic (Kelemen et al. 2002, section 3.4), so that what the
 //!   chain seldom visits is as good as ordinary samples make it;
+//! * a sample of the pool that chains start from is a whole bidirectional one: all techniques, all lengths;
 //! * chains are short and many, their starts drawn by systematic resampling from a pool of independent samples, which makes them free
 //!   of start-up bias (Veach 1997, section 11.3.1).
 
@@ -17,7 +18,7 @@ mod chain;
 mod constants;
 mod evaluate;
 
-pub use bootstrap::{BootstrapSums, run_bootstrap};
+pub use bootstrap::{BootstrapSums, Found, run_bootstrap};
 pub use chain::{ChainStart, ChainStats, ChainTask, Mismatch, run_chains};
-pub use constants::{ChainConstants, Depth, MmltOptions, TARGET_CELL, allowed_techniques};
+pub use constants::{ChainConstants, Depth, MmltOptions, TARGET_CELL};
 pub use evaluate::{Evaluator, Proposal};
