@@ -20,6 +20,7 @@ pub(super) struct SurfacePoint {
 ///
 /// Computed in double precision: an affine combination of the corners lies in their plane to 1e-16, so that the only error of `p`
 /// is its rounding to f32 (and, for an instance, the rounding of the ray origin that will be mapped back to object space).
+#[inline]
 pub(super) fn at(mesh: &Mesh, object: &Object, triangle: u32, b: [f32; 2]) -> SurfacePoint {
     let corners = mesh.triangles[triangle as usize].map(|i| i as usize);
     let [p0, p1, p2] = corners.map(|i| mesh.positions[i].as_dvec3());
@@ -72,8 +73,16 @@ fn mapped_rounding(to_world: &Transform, local: DVec3) -> Vec3 {
 }
 
 /// The unit vector along `e1 x e2`; some unit vector when the triangle has no area.
+#[inline]
 fn normal_of(e1: DVec3, e2: DVec3) -> Vec3 {
-    // Edges are scaled first: squares of small lengths must not vanish.
+    let n = e1.cross(e2);
+    let length2 = n.length_squared();
+    if length2 > 1e-280 && length2 < 1e280 { (n * (1.0 / length2.sqrt())).as_vec3() } else { scaled_normal(e1, e2) }
+}
+
+/// The same for edges so short or long that their products leave the range of numbers.
+#[cold]
+fn scaled_normal(e1: DVec3, e2: DVec3) -> Vec3 {
     let scale = e1.abs().max_element().max(e2.abs().max_element());
     if !(scale > 0.0) {
         return Vec3::Z;
@@ -91,7 +100,7 @@ fn shading_normal(mesh: &Mesh, object: &Object, corners: [usize; 3], b: [f32; 2]
     let [n0, n1, n2] = corners.map(|i| mesh.normals[i]);
     let n = object.to_world.normal(n0 * (1.0 - b[0] - b[1]) + n1 * b[0] + n2 * b[1]).as_dvec3();
     let length = n.length();
-    let n = (n / length).as_vec3();
+    let n = (n * (1.0 / length)).as_vec3();
     (length > 0.0 && n.is_finite()).then_some(if object.flip_normals { -n } else { n })
 }
 
@@ -99,9 +108,10 @@ fn shading_normal(mesh: &Mesh, object: &Object, corners: [usize; 3], b: [f32; 2]
 fn derivatives(uvs: [Vec2; 3], e1: DVec3, e2: DVec3, ng: Vec3) -> (Vec3, Vec3) {
     let (d1, d2) = ((uvs[1] - uvs[0]).as_dvec2(), (uvs[2] - uvs[0]).as_dvec2());
     let det = d1.x * d2.y - d1.y * d2.x;
-    let dpdu = ((e1 * d2.y - e2 * d1.y) / det).as_vec3();
-    let dpdv = ((e2 * d1.x - e1 * d2.x) / det).as_vec3();
-    let usable = |v: Vec3| v.is_finite() && v.length_squared() > 0.0 && v.length_squared().is_finite();
+    let scale = 1.0 / det;
+    let dpdu = ((e1 * d2.y - e2 * d1.y) * scale).as_vec3();
+    let dpdv = ((e2 * d1.x - e1 * d2.x) * scale).as_vec3();
+    let usable = |v: Vec3| v.length_squared() > 0.0 && v.length_squared() < f32::INFINITY;
     if det != 0.0 && usable(dpdu) && usable(dpdv) && dpdu.cross(dpdv) != Vec3::ZERO {
         return (dpdu, dpdv);
     }

@@ -38,14 +38,14 @@ pub struct MmltOptions {
 impl Default for MmltOptions {
     fn default() -> Self {
         Self {
-            large_step: 0.3,
+            large_step: 0.1,
             step_min: 1.0 / 1024.0,
             step_max: 1.0 / 64.0,
             kelemen: true,
             lift: 0.5,
             learn: true,
-            chain_length: 8192,
-            direct_share: 0.25,
+            chain_length: 1 << 16,
+            direct_share: 0.2,
             pool_share: 0.1,
             direct_edges: 2,
             longest: 64,
