@@ -6,10 +6,14 @@ use crate::output::Console;
 use crate::pictures::{Pictures, Summary};
 use crate::preview::Preview;
 use crate::progress::{Moment, Progress};
-use crate::{scene_file, signals};
-use renderer::job::{LocalEvent, LocalOptions, LocalOutcome, Merger, RenderSettings, Stop, UnitError, render_local};
+use crate::{save, scene_file, signals};
+use renderer::film::png;
+use renderer::integrator::IntegratorKind;
+use renderer::job::{
+    LocalEvent, LocalOptions, LocalOutcome, Merger, RenderSettings, Stop, UnitError, render_local, render_strategies,
+};
 use renderer::scene::Scene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What to render and where to put it.
@@ -23,6 +27,10 @@ pub struct Args {
     threads: ThreadArgs,
     #[command(flatten)]
     output: OutputArgs,
+    /// For debugging bdpt: also write what each strategy (s, t) makes, with and without its weight, as strategies.png and
+    /// strategies-unweighted.png into this folder: a row for each path length from 2 edges, a column for each s from 0
+    #[arg(long, value_name = "FOLDER")]
+    strategies: Option<PathBuf>,
 }
 
 static STOP: Stop = Stop::new();
@@ -39,6 +47,9 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         .map_err(|e| Failure::Input(format!("error: {e}")))?;
     let (manifest, _) = loaded.files.into_bundle(loaded.root);
     let options = LocalOptions { threads: args.threads.count() };
+    if let Some(folder) = &args.strategies {
+        write_strategies(folder, &loaded.scene, &settings, options.threads, pictures.exposure, console)?;
+    }
     let mut session = Session { progress: Progress::new(console), settings: &settings };
     let mut preview = Preview::new(pictures.png.clone(), pictures.exposure, started);
     let outcome = session.render(&loaded.scene, &options, &mut preview);
@@ -58,6 +69,37 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         None if outcome.interrupted => Err(Failure::Interrupted),
         None => Ok(()),
     }
+}
+
+/// Samples per pixel of the strategies' pictures, where the job does not say.
+const STRATEGY_SAMPLES: u32 = 64;
+
+/// Renders and writes the pictures of the strategies.
+fn write_strategies(
+    folder: &Path,
+    scene: &Scene,
+    settings: &RenderSettings,
+    threads: usize,
+    exposure: f64,
+    console: &Console,
+) -> Outcome {
+    if settings.integrator != IntegratorKind::Bdpt {
+        return Err(Failure::Usage("error: --strategies shows those of bdpt; give --integrator bdpt".into()));
+    }
+    std::fs::create_dir_all(folder).map_err(|e| save::failure(folder, &e))?;
+    let spp = settings.budget.spp.unwrap_or(STRATEGY_SAMPLES);
+    let Some(pictures) = render_strategies(scene, settings, spp, threads, &STOP) else {
+        return Err(Failure::Interrupted);
+    };
+    for (name, weighted) in [("strategies.png", true), ("strategies-unweighted.png", false)] {
+        let path = folder.join(name);
+        let (width, height, pixels) = pictures.pyramid(weighted);
+        let bytes = png::encode_pixels(width, height, &pixels, exposure)
+            .map_err(|e| Failure::Machine(format!("error: {}: {e}", path.display())))?;
+        save::write(&path, &bytes).map_err(|e| save::failure(&path, &e))?;
+        console.note(path.display());
+    }
+    Ok(())
 }
 
 /// A render with progress and previews.
@@ -86,7 +128,8 @@ impl Session<'_> {
         let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
         // Of several budgets, the one that is nearest to its end tells how far the job is.
         let time = self.settings.budget.time_s.map_or(0.0, |t| self.progress.seconds() / t);
-        let spp = if self.settings.budget.spp.is_some() { merger.fraction() } else { 0.0 };
+        let counted = self.settings.budget.spp.or(self.settings.budget.mpp).is_some();
+        let spp = if counted { merger.fraction() } else { 0.0 };
         let fraction = if merger.finished() { 1.0 } else { spp.max(time).min(1.0) };
         let samples = merger.counters().samples;
         self.progress.show(&Moment { fraction, samples, pixels, error: preview.error() });

@@ -5,6 +5,7 @@ mod context;
 pub mod light;
 pub mod mmlt;
 pub mod path;
+pub mod strategies;
 
 pub use context::{Carried, UnitContext, View};
 

@@ -14,6 +14,6 @@ pub use codec::DecodeError;
 pub use local::{LocalEvent, LocalOptions, LocalOutcome, render_local};
 pub use merger::{FoldError, Merger};
 pub use plan::{GroupRange, Learned, Part, PassPlan, Planner, Sampling};
-pub use run::{Stop, UnitError, run_unit};
+pub use run::{Stop, UnitError, render_strategies, run_unit};
 pub use settings::{Budget, RenderOptions, RenderSettings, SettingsError};
 pub use unit::{Unit, UnitKind, UnitResult};

@@ -4,6 +4,7 @@ use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Rect, SplatSums};
 use crate::integrator::mmlt::{self, ChainTask, Mismatch};
+use crate::integrator::strategies::{self, Strategies};
 use crate::integrator::{self, Carried, IntegratorKind, UnitContext, View};
 use crate::light::LightSelector;
 use crate::scene::Scene;
@@ -153,6 +154,51 @@ fn run(
         splats.round();
     }
     Ok(done.then_some(result))
+}
+
+/// The pictures of the strategies of bidirectional path tracing at `spp` samples per pixel, on `threads` threads; `None` when stopped.
+/// The samples' shares are fixed, so that the pictures do not depend on the threads.
+pub fn render_strategies(
+    scene: &Scene,
+    settings: &RenderSettings,
+    spp: u32,
+    threads: usize,
+    stop: &Stop,
+) -> Option<Strategies> {
+    let view = View::new(scene, settings.width, settings.height, settings.filter)?;
+    let view = &view;
+    let sample = move |index| {
+        let context = UnitContext {
+            scene,
+            view,
+            seed: settings.seed,
+            replicate: 0,
+            max_depth: settings.max_depth.unwrap_or(strategies::MAX_EDGES),
+            carried: Carried::ALL,
+            rr_depth: u32::MAX,
+            threshold: 0.0,
+            selector: &scene.selector,
+            stopped: &|| stop.stopped(),
+        };
+        Strategies::render(&context, index..index + 1)
+    };
+    let mut sum: Option<Strategies> = None;
+    for first in (0..spp).step_by(threads.max(1)) {
+        let last = spp.min(first + threads.max(1) as u32);
+        let rendered: Vec<Option<Strategies>> = std::thread::scope(|scope| {
+            let start = |index| scope.spawn(move || sample(index));
+            let handles: Vec<_> = (first..last).map(start).collect();
+            handles.into_iter().map(|h| h.join().ok().flatten()).collect()
+        });
+        for one in rendered {
+            let one = one?;
+            match &mut sum {
+                Some(sum) => sum.add(&one),
+                None => sum = Some(one),
+            }
+        }
+    }
+    sum
 }
 
 /// A tile of the job's ordinary samples.
