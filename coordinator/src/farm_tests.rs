@@ -5,7 +5,9 @@ use super::*;
 use crate::ids::Epoch;
 use crate::outcome::{Interest, UnitAt};
 use crate::sync::{Held, Poll, Report};
-use renderer::job::{Planner, RenderOptions, RenderSettings};
+use renderer::integrator::IntegratorKind;
+use renderer::integrator::mmlt::ChainStart;
+use renderer::job::{Learned, Part, Planner, RenderOptions, RenderSettings};
 use renderer::scene::desc::RenderDefaults;
 use uuid::Uuid;
 
@@ -26,14 +28,13 @@ fn at(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
 }
 
-/// A job of `side` x `side` pixels: one unit per 128 x 128 pixels in its first pass.
-fn settings(side: u32) -> RenderSettings {
-    let options = RenderOptions { spp: Some(64), size: Some((side, side)), ..RenderOptions::default() };
+/// A job of `side` x `side` pixels; of paths, one unit per 128 x 128 pixels in its first pass.
+fn settings(integrator: IntegratorKind, side: u32) -> RenderSettings {
+    let options = RenderOptions { size: Some((side, side)), ..RenderOptions::counting(integrator, 64) };
     RenderSettings::resolve(&options, &RenderDefaults::default()).unwrap()
 }
 
-fn job(id: JobId, priority: i32, side: u32) -> Job {
-    let settings = settings(side);
+fn job(id: JobId, priority: i32, settings: RenderSettings) -> Job {
     let zero = Digest([0; 32]);
     let spec = JobSpec {
         name: "job".into(),
@@ -49,8 +50,26 @@ fn job(id: JobId, priority: i32, side: u32) -> Job {
     Farm::new_job(id, spec, JobState::Active)
 }
 
-fn plan(side: u32) -> Arc<PassPlan> {
-    Arc::new(Planner::new(settings(side)).first())
+/// The passes of a job as they could be: what the later ones depend on is made up.
+fn plans(settings: &RenderSettings) -> Vec<Arc<PassPlan>> {
+    let planner = Planner::new(settings.clone());
+    let first = planner.first();
+    let later = match settings.integrator {
+        IntegratorKind::Path | IntegratorKind::Light => Vec::new(),
+        IntegratorKind::Bdpt => planner.next(1, first.spp() as u32, Learned::default()).into_iter().collect(),
+        IntegratorKind::Mmlt => {
+            let groups = 0..settings.replicates;
+            let pools = groups.clone().map(|replicate| Part::Bootstrap { replicate, samples: 10_000 }).collect();
+            let chains = |replicate| {
+                let starts = vec![ChainStart(1, 1, 0.5); 6];
+                Part::Chains { replicate, edges: 3, b: 0.1, starts, mutations: 1 << 17 }
+            };
+            let chains = groups.map(chains).chain(first.parts.first().cloned()).collect();
+            let pass = |pass, parts, chain_weight, last| PassPlan { pass, parts, chain_weight, last, ..first.clone() };
+            vec![pass(1, pools, 0, false), pass(2, chains, 64, true)]
+        }
+    };
+    std::iter::once(first).chain(later).map(Arc::new).collect()
 }
 
 fn job_id(n: u128) -> JobId {
@@ -75,7 +94,10 @@ struct World {
     farm: Farm,
     random: Random,
     sims: Vec<Sim>,
+    /// Units of the pass under way that are stored.
     stored: BTreeMap<JobId, UnitSet>,
+    /// Passes that are not begun yet.
+    ahead: BTreeMap<JobId, Vec<Arc<PassPlan>>>,
     now: f64,
     faults: bool,
     generation: u32,
@@ -92,6 +114,7 @@ impl World {
             random: Random(seed),
             sims: Vec::new(),
             stored: BTreeMap::new(),
+            ahead: BTreeMap::new(),
             now: 0.0,
             faults: true,
             generation: 1,
@@ -102,9 +125,25 @@ impl World {
     }
 
     fn add_job(&mut self, id: JobId, priority: i32, side: u32) {
-        self.farm.add_job(job(id, priority, side));
-        self.farm.begin_pass(id, plan(side), Digest([1; 32]), UnitSet::default(), at(self.now));
+        self.add_job_of(IntegratorKind::Path, id, priority, side);
+    }
+
+    fn add_job_of(&mut self, integrator: IntegratorKind, id: JobId, priority: i32, side: u32) {
+        let settings = settings(integrator, side);
+        self.ahead.insert(id, plans(&settings));
+        self.farm.add_job(job(id, priority, settings));
+        self.begin_next_pass(id);
+    }
+
+    fn begin_next_pass(&mut self, id: JobId) {
+        let plan = self.ahead.get_mut(&id).unwrap().remove(0);
+        self.farm.begin_pass(id, plan, Digest([1; 32]), UnitSet::default(), at(self.now));
         self.stored.insert(id, UnitSet::default());
+    }
+
+    /// Whether all units of the pass under way are stored.
+    fn pass_complete(&self, id: JobId) -> bool {
+        self.stored[&id].len() >= self.total(id)
     }
 
     fn add_worker(&mut self, pace: f64) {
@@ -154,6 +193,8 @@ impl World {
         for grant in &reply.grants {
             assert!(self.epochs.insert(grant.epoch), "an epoch was given out twice");
             assert!(!grant.units.is_empty());
+            let under_way = self.farm.job(grant.job).and_then(|j| j.pass.as_ref()).map(|p| p.plan.pass);
+            assert_eq!(under_way, Some(grant.pass), "units of another pass were given out");
             for unit in grant.units.clone() {
                 assert!(!self.stored[&grant.job].contains(unit), "a stored unit was given out");
             }
@@ -233,7 +274,7 @@ impl World {
         self.generation += 1;
         let old = std::mem::replace(&mut self.farm, Farm::new(Tuning::default(), self.generation));
         for (id, j) in old.jobs() {
-            let mut job = job(*id, j.spec.priority, j.spec.settings.width);
+            let mut job = job(*id, j.spec.priority, j.spec.settings.clone());
             job.state = JobState::Restoring { paused: false };
             self.farm.add_job(job);
             let plan = j.pass.as_ref().unwrap().plan.clone();
@@ -243,8 +284,14 @@ impl World {
 
     /// Runs until all is stored; fails if that takes too long after the faults have ended.
     fn run(&mut self, faults_end: f64, patience: f64) {
-        while self.stored.iter().any(|(id, units)| units.len() < self.total(*id)) {
+        let jobs: Vec<JobId> = self.stored.keys().copied().collect();
+        while !jobs.iter().all(|id| self.pass_complete(*id) && self.ahead[id].is_empty()) {
             self.now += 0.05;
+            for id in &jobs {
+                if self.pass_complete(*id) && !self.ahead[id].is_empty() {
+                    self.begin_next_pass(*id);
+                }
+            }
             self.faults = self.now < faults_end;
             assert!(
                 self.now < faults_end + patience,
@@ -277,15 +324,20 @@ fn whatever_happens_every_unit_is_stored_once_and_the_jobs_end() {
         let mut world = World::new(seed);
         world.add_job(job_id(1), 0, 1536);
         let priority = world.random.below(2) as i32;
-        world.add_job(job_id(2), priority, 640);
+        let kinds = [IntegratorKind::Path, IntegratorKind::Bdpt, IntegratorKind::Mmlt];
+        let kind = kinds[seed as usize % kinds.len()];
+        let side = if kind == IntegratorKind::Path { 640 } else { 256 };
+        world.add_job_of(kind, job_id(2), priority, side);
+        assert_eq!(world.ahead[&job_id(2)].len(), seed as usize % kinds.len(), "passes after the first");
         for n in 0..1 + world.random.below(4) {
             world.add_worker(0.05 + 0.1 * f64::from(n));
         }
-        world.run(30.0, 150.0);
+        world.run(30.0, 400.0);
         for (id, units) in &world.stored {
             assert_eq!(units.len(), world.total(*id));
         }
-        assert_eq!((world.total(job_id(1)), world.total(job_id(2))), (144, 25));
+        let last = plans(&settings(kind, side)).last().unwrap().unit_count();
+        assert_eq!((world.total(job_id(1)), world.total(job_id(2))), (144, last));
         fired.iter_mut().zip(world.fired).for_each(|(sum, n)| *sum += n);
     }
     assert!(fired.iter().all(|n| *n > 150), "some faults hardly happened: {fired:?}");

@@ -151,9 +151,13 @@ impl Farm {
 
     /// A worker's record.
     pub fn worker(&self, name: &str) -> Value {
+        self.worker_if_known(name).unwrap_or_else(|| panic!("the coordinator does not know worker {name}"))
+    }
+
+    /// A worker's record, once it has called.
+    pub fn worker_if_known(&self, name: &str) -> Option<Value> {
         let all = self.json(&["workers"]);
-        let found = all["workers"].as_array().expect("a list").iter().find(|w| w["name"] == name);
-        found.unwrap_or_else(|| panic!("the coordinator does not know worker {name}: {all}")).clone()
+        all["workers"].as_array().expect("a list").iter().find(|w| w["name"] == name).cloned()
     }
 
     /// Waits for a job to be done.

@@ -11,8 +11,13 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Some seconds of work on one core, in some tens of units.
 fn options(integrator: &str) -> Vec<&str> {
-    let spp = if integrator == "light" { "768" } else { "512" };
-    vec!["--integrator", integrator, "--spp", spp, "--size", "128x96", "--seed", "7"]
+    let budget = match integrator {
+        "light" => ["--spp", "768"],
+        "bdpt" => ["--spp", "128"],
+        "mmlt" => ["--mpp", "256"],
+        _ => ["--spp", "512"],
+    };
+    [&["--integrator", integrator][..], &budget, &["--size", "128x96", "--seed", "7"]].concat()
 }
 
 /// What `lightfarm render` makes of it.
@@ -39,7 +44,7 @@ fn three_workers(integrator: &str, reference: &Path) {
     // Mid-unit: it holds units, and has delivered some, so it is past loading the scene.
     until("the victim renders", PATIENCE, || {
         let w = farm.worker("victim");
-        w["held_units"].as_u64() > Some(0) && w["units"].as_u64() > Some(0)
+        w["held_units"].as_u64() > Some(0) && w["units"].as_u64() > Some(0) && farm.fraction(&job) > 0.0
     });
     farm.kill_worker("victim");
     assert!(farm.fraction(&job) < 1.0, "the kill came too late");
@@ -87,6 +92,69 @@ fn one_worker(integrator: &str, reference: &Path) {
     assert_eq!(std::fs::read(reference).unwrap(), std::fs::read(fetched).unwrap());
 }
 
+/// The pass under way, units of it that are stored, and how many it has; `None` between passes and while restoring.
+fn pass(farm: &Farm, job: &Job) -> Option<(u64, u64, u64)> {
+    let shown = farm.show(job);
+    let number = |key: &str| shown[key].as_u64().unwrap();
+    (number("units") > 0).then(|| (number("pass"), number("units_stored"), number("units")))
+}
+
+/// Waits until a worker holds units of a pass.
+fn until_held(farm: &Farm, job: &Job, worker: &str, wanted: u64) {
+    until(&format!("{worker} holds units of pass {wanted}"), PATIENCE, || {
+        // In this order: what is held then is of this pass or of a later one, and passes only begin when all is stored.
+        let held = farm.worker_if_known(worker).is_some_and(|w| w["held_units"].as_u64() > Some(0));
+        let Some((at, stored, units)) = pass(farm, job) else { return false };
+        assert!(at <= wanted, "pass {wanted} was over too soon for a kill");
+        held && at == wanted && stored < units
+    });
+}
+
+/// A worker is killed in each of the first three passes, alone, so that nobody goes on with its pass; then others end the job.
+fn worker_killed_in_each_pass(integrator: &str, reference: &Path) {
+    let mut farm = Farm::start();
+    let job = submit(&farm, integrator);
+    for wanted in 0..3 {
+        let name = format!("victim-{wanted}");
+        farm.start_worker(&name, 1);
+        until_held(&farm, &job, &name, wanted);
+        farm.kill_worker(&name);
+        until("the loss is noticed", Duration::from_secs(5), || farm.worker(&name)["state"] == "lost");
+        let (at, stored, units) = pass(&farm, &job).unwrap();
+        assert!(at == wanted && stored < units, "the kill came too late: pass {at}, {stored} of {units} units");
+        assert!(farm.worker(&name)["losses"].as_u64() > Some(0), "{name} held nothing when it died");
+        if wanted < 2 {
+            // Somebody has to bring the job to the next pass: a worker that is killed as soon as it has.
+            let bridge = format!("bridge-{wanted}");
+            farm.start_worker(&bridge, 1);
+            until("the pass ends", PATIENCE, || pass(&farm, &job).is_some_and(|p| p.0 > wanted));
+            farm.kill_worker(&bridge);
+        }
+    }
+    farm.start_worker("late", 1);
+    farm.start_worker("later", 1);
+    farm.wait(&job, PATIENCE);
+    assert_same_pixels(reference, &farm.fetch(&job, "passes.exr"));
+}
+
+/// A coordinator that is killed in each of the first three passes.
+fn coordinator_killed_in_each_pass(integrator: &str, reference: &Path) {
+    let mut farm = Farm::start();
+    let job = submit(&farm, integrator);
+    farm.start_worker("only", 1);
+    for wanted in 0..3 {
+        until_held(&farm, &job, "only", wanted);
+        farm.kill_coordinator();
+        farm.start_coordinator();
+        until("the job is restored", PATIENCE, || pass(&farm, &job).is_some());
+        // The worker went on meanwhile, so that it may be a pass further already.
+        assert!(pass(&farm, &job).is_none_or(|p| p.0 >= wanted), "a pass was forgotten");
+    }
+    farm.start_worker("late", 1);
+    farm.wait(&job, PATIENCE);
+    assert_same_pixels(reference, &farm.fetch(&job, "coordinator.exr"));
+}
+
 fn all(integrator: &str) {
     let folder = TempDir::new().unwrap();
     let one = reference(&folder, integrator, "1");
@@ -94,6 +162,10 @@ fn all(integrator: &str) {
     one_worker(integrator, &one);
     three_workers(integrator, &one);
     killed_coordinator(integrator, &one);
+    if integrator == "mmlt" {
+        worker_killed_in_each_pass(integrator, &one);
+        coordinator_killed_in_each_pass(integrator, &one);
+    }
 }
 
 #[test]
@@ -104,4 +176,15 @@ fn tiles_are_the_same_through_every_history() {
 #[test]
 fn splats_are_the_same_through_every_history() {
     all("light");
+}
+
+#[test]
+fn tiles_with_splats_are_the_same_through_every_history() {
+    all("bdpt");
+}
+
+/// Pilot, pools and chains: passes that depend on what those before them found.
+#[test]
+fn chains_are_the_same_through_every_history() {
+    all("mmlt");
 }
