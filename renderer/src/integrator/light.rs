@@ -4,17 +4,18 @@
 //! mirrors is the same image.
 
 use super::UnitContext;
-use crate::bsdf::{ShadingPoint, Transport};
 use crate::film::{Counters, SplatSums};
-use crate::light::Light;
-use crate::math::{Anchor, Vec2};
-use crate::path::roulette;
-use crate::sampling::{Choice, Sampler, SobolSampler};
+use crate::math::{Anchor, Ray, Vec2};
+use crate::path::mis::Heuristic;
+use crate::path::{Subpath, Tracer};
+use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
 /// Streams of light paths lie beyond all pixel numbers.
 const LIGHT_STREAM: u64 = 1 << 40;
+/// The block of numbers of the light seen directly lies beyond those of all walks.
+const EMISSION: u32 = 1 << 20;
 
 /// Traces light paths `paths` of the replicate; returns the luminance splatted per light, `None` when stopped.
 ///
@@ -26,40 +27,48 @@ pub fn trace_paths(
     counters: &mut Counters,
 ) -> Option<Vec<f64>> {
     counters.samples += paths.end - paths.start;
-    let mut tracer = Tracer { c, splats, counters, light_sums: vec![0.0; c.scene.lights.len()], light: 0 };
+    let tracer = Tracer {
+        scene: c.scene,
+        camera: &c.view.camera,
+        selector: c.selector,
+        rr_depth: Some(c.rr_depth),
+        heuristic: Heuristic::Power,
+        counters: Counters::default(),
+    };
+    let mut film = Film { c, tracer, splats, light_sums: vec![0.0; c.scene.lights.len()] };
+    let mut walk = Subpath::default();
     for path in paths {
         if path % 256 == 0 && (c.stopped)() {
             return None;
         }
         let mut sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + (path >> 32), path as u32);
-        let lens_u = if c.view.camera.is_pinhole() { Vec2::ZERO } else { sampler.next_2d() };
-        let Some(choice) = c.selector.sample(sampler.next_1d()) else { continue };
-        let light = &c.scene.lights[choice.index];
-        tracer.light = choice.index;
-        tracer.emission(light, &choice, lens_u, &mut sampler);
-        tracer.walk(light, &choice, lens_u, &mut sampler);
+        film.emission(&mut sampler);
+        film.scattered(&mut walk, &mut sampler);
     }
-    Some(tracer.light_sums)
+    counters.add(&film.tracer.counters);
+    Some(film.light_sums)
 }
 
-struct Tracer<'a> {
+struct Film<'a> {
     c: &'a UnitContext<'a>,
+    tracer: Tracer<'a>,
     splats: &'a mut SplatSums,
-    counters: &'a mut Counters,
     /// Luminance splatted per light.
     light_sums: Vec<f64>,
-    /// The light of the path under way.
-    light: usize,
 }
 
-impl Tracer<'_> {
+impl Film<'_> {
     /// The light seen directly: a point of the light (or a direction of the sky) drawn towards a point of the lens.
-    fn emission(&mut self, light: &Light, choice: &Choice, lens_u: Vec2, sampler: &mut impl Sampler) {
-        let u = sampler.next_2d();
+    fn emission(&mut self, sampler: &mut impl Sampler) {
         let view = self.c.view;
         if self.c.max_depth < 1 {
             return;
         }
+        sampler.start_vertex(EMISSION);
+        let (uc, u) = (sampler.next_1d(), sampler.next_2d());
+        let lens_u = self.tracer.lens_numbers(sampler);
+        let Some(choice) = self.c.selector.sample(uc) else { return };
+        let light = &self.c.scene.lights[choice.index];
         let lens = view.camera.generate_ray(Vec2::ZERO, lens_u).o;
         let Some(li) = light.sample_li(&self.c.scene.light_context(), lens, choice.u, u) else { return };
         if li.delta {
@@ -70,63 +79,38 @@ impl Tracer<'_> {
         let pixels = view.width as f32 * view.height as f32;
         let per_raster_area = view.camera.pdf_we(li.wi).1 * pixels;
         let value = li.radiance * (per_raster_area / (li.pdf * choice.pmf));
-        self.splat(raster, value, || li.shadow_ray(&Anchor::free(lens)));
+        self.splat(choice.index, raster, value, || li.shadow_ray(&Anchor::free(lens)));
     }
 
-    /// The walk through the scene; every vertex is connected to the camera.
-    fn walk(&mut self, light: &Light, choice: &Choice, lens_u: Vec2, sampler: &mut impl Sampler) {
-        let scene = self.c.scene;
-        let (u_pos, u_dir) = (sampler.next_2d(), sampler.next_2d());
-        let Some(le) = light.sample_le(&scene.light_context(), choice.u, u_pos, u_dir) else { return };
-        let mut beta = le.throughput() / choice.pmf;
-        let start = beta.max_component();
-        let mut ray = le.ray;
-        let mut edges = 0;
-        // A connection adds an edge to those that the walk has behind it.
-        while edges + 1 < self.c.max_depth && self.counters.admit(beta) && !beta.is_black() {
-            edges += 1;
-            sampler.start_vertex(edges);
-            self.counters.rays += 1;
-            let Some(hit) = scene.accel.intersect(&ray) else { break };
-            let hit = scene.geometry.interaction(&ray, &hit);
-            let material = scene.objects[hit.object.0 as usize].material;
-            let shading = ShadingPoint::new(&scene.materials, &scene.textures, material, &hit, -ray.d);
-
-            // Connect to the camera.
-            if !shading.is_delta_only()
-                && let Some(we) = self.c.view.camera.sample_we(hit.p, lens_u)
+    /// A walk from a light; each of its surfaces is connected to the camera. That adds an edge to those of the walk.
+    fn scattered(&mut self, walk: &mut Subpath, sampler: &mut impl Sampler) {
+        let limit = usize::try_from(self.c.max_depth).unwrap_or(usize::MAX);
+        if limit < 2 {
+            return;
+        }
+        self.tracer.light_walk(walk, sampler, limit);
+        let Some(start) = walk.light else { return };
+        sampler.start_vertex(EMISSION + 1);
+        let lens_u = self.tracer.lens_numbers(sampler);
+        for s in 2..=walk.vertices.len() {
+            if let Some(path) = self.tracer.to_lens(walk, s, lens_u)
+                && let (Some(raster), Some(ray)) = (path.raster, path.shadow)
             {
-                let f = shading.eval(we.wi, Transport::Importance);
-                let cos = shading.abs_cos(we.wi) * shading.adjoint_correction(we.wi);
-                let value = beta * f * (cos * we.we / we.pdf);
-                self.splat(we.raster, value, || we.shadow_ray(&hit.anchor()));
-            }
-
-            // Go on in a direction drawn from the BSDF.
-            let uc = sampler.next_1d();
-            let u = sampler.next_2d();
-            let Some(s) = shading.sample(uc, u, Transport::Importance) else { break };
-            beta *= s.weight() * shading.adjoint_correction(s.wi);
-            ray = hit.spawn_ray(s.wi);
-
-            // End the path by chance when it carries little of what it started with.
-            if edges >= self.c.rr_depth {
-                let Some(factor) = roulette(beta / start, sampler.next_1d()) else { break };
-                beta *= factor;
+                self.splat(start.index, raster, path.value, || ray);
             }
         }
     }
 
     /// Adds a contribution at a raster position to all pixels whose filter covers it, if nothing is in the way.
-    fn splat(&mut self, raster: Vec2, value: Rgb, shadow_ray: impl FnOnce() -> crate::math::Ray) {
-        if value.is_black() || !self.counters.admit(value) {
+    fn splat(&mut self, light: usize, raster: Vec2, value: Rgb, shadow_ray: impl FnOnce() -> Ray) {
+        if value.is_black() || !self.tracer.counters.admit(value) {
             return;
         }
         let footprint = self.c.view.filter.weights(raster);
         if footprint.is_empty() {
             return;
         }
-        self.counters.rays += 1;
+        self.tracer.counters.rays += 1;
         if self.c.scene.accel.occluded(&shadow_ray()) {
             return;
         }
@@ -135,6 +119,6 @@ impl Tracer<'_> {
             self.splats.add(x, y, value * weight);
             total += weight;
         }
-        self.light_sums[self.light] += f64::from(value.luminance() * total);
+        self.light_sums[light] += f64::from(value.luminance() * total);
     }
 }
