@@ -1,7 +1,8 @@
-//! Figures: rays per second, samples per second, error against time, what the farm costs; whether integrators agree. See `README.md`
-//! beside this crate.
+//! Figures: rays per second, samples per second, error against time, what the farm costs; whether integrators agree and
+//! whether the errors that they tell are true. See `README.md` beside this crate.
 
 mod agree;
+mod coverage;
 mod error;
 mod farm;
 mod meshes;
@@ -34,6 +35,8 @@ enum What {
     Farm(farm::Args),
     /// Whether all integrators render the same pictures; exit status 1 when they don't.
     Agree(agree::Args),
+    /// Whether the errors that pictures tell of themselves are true; exit status 1 when they aren't.
+    Coverage(coverage::Args),
 }
 
 fn main() -> ExitCode {
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         What::Error(args) => error::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Farm(args) => farm::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Agree(args) => agree::run(args).map(|r| (show(cli.json, &r, agree::table), r.passed)),
+        What::Coverage(args) => coverage::run(args).map(|r| (show(cli.json, &r, ToString::to_string), r.passed())),
     };
     match result {
         Ok((text, passed)) => {

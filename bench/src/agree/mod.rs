@@ -4,7 +4,7 @@ mod compare;
 mod picture;
 mod render;
 mod report;
-mod scenes;
+pub mod scenes;
 #[cfg(test)]
 mod tests;
 

@@ -63,8 +63,8 @@ pub struct Args {
     threads: usize,
 }
 
-/// `WxH`.
-fn size(text: &str) -> Result<(u32, u32), String> {
+/// The size of a picture, written as `WxH`.
+pub fn size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     sides.ok_or_else(|| format!("{text:?} is not WIDTHxHEIGHT, such as 640x480"))
 }

@@ -270,6 +270,11 @@ impl Merger {
         MergedImage::from_groups(w, h, groups, self.aovs.clone(), self.counters)
     }
 
+    /// The replicate groups: independent pictures of the same, whose scatter tells the error.
+    pub fn groups(&self) -> &[GroupFilm] {
+        &self.groups
+    }
+
     /// How the mutations of a Metropolis job fared.
     pub fn chain_stats(&self) -> ChainStats {
         self.chain_stats
