@@ -7,6 +7,7 @@ use crate::outcome::UnitAt;
 use crate::registry::{Worker, WorkerState};
 use crate::sync::{Held, Reply, Report};
 use crate::units::UnitSet;
+use renderer::integrator::mmlt::Mismatch;
 use renderer::scene::bundle::Digest;
 use std::ops::Range;
 use std::time::Duration;
@@ -135,6 +136,8 @@ pub struct Head {
     pub digest: Digest,
     /// Why there are none.
     pub failure: Option<String>,
+    /// The failure is that the start of a chain is not what the pool says.
+    pub mismatch: Option<Mismatch>,
 }
 
 /// Reads an outcome's head.
@@ -150,6 +153,12 @@ pub fn head(h: &proto::OutcomeHead) -> Result<Head, Status> {
         len: h.len,
         digest: if failed { Digest([0; 32]) } else { digest(&h.digest)? },
         failure: failed.then(|| message(&h.failure)),
+        mismatch: h.mismatch.as_ref().filter(|_| failed).map(|m| Mismatch {
+            edges: m.edges,
+            index: m.sample,
+            expected: m.expected,
+            found: m.found,
+        }),
     })
 }
 

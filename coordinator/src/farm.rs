@@ -149,7 +149,7 @@ impl Farm {
         }
         let board = PassBoard::new(plan.unit_count(), done);
         job.progress.folded = 0;
-        job.pass = Some(Pass { plan, document, board, failures: BTreeMap::new() });
+        job.pass = Some(Pass { plan, document, board, failures: BTreeMap::new(), mismatches: BTreeMap::new() });
         self.wake_all();
     }
 

@@ -6,7 +6,7 @@ use crate::ids::Epoch;
 use crate::outcome::{Interest, UnitAt};
 use crate::sync::{Held, Poll, Report};
 use renderer::integrator::IntegratorKind;
-use renderer::integrator::mmlt::ChainStart;
+use renderer::integrator::mmlt::{ChainStart, Mismatch};
 use renderer::job::{Learned, Part, Planner, RenderOptions, RenderSettings};
 use renderer::scene::desc::RenderDefaults;
 use uuid::Uuid;
@@ -475,4 +475,48 @@ fn a_quarantined_worker_gets_nothing_more() {
     let sim = &world.sims[0];
     let Poll::Reply(reply) = world.farm.poll(sim.id, sim.sequence, true, at(1.0)) else { panic!() };
     assert!(reply.grants.is_empty() && reply.notice.contains("wrong bits"));
+}
+
+#[test]
+fn who_disagrees_with_a_pool_is_quarantined_unless_two_do() {
+    let mut world = World::new(1);
+    world.faults = false;
+    world.add_job_of(IntegratorKind::Mmlt, job_id(1), 0, 256);
+    while !world.ahead[&job_id(1)].is_empty() {
+        world.begin_next_pass(job_id(1));
+    }
+    for name in ["good", "odd", "odd", "other"] {
+        world.add_worker(1.0);
+        let n = world.sims.len() - 1;
+        world.call(n);
+        world.farm.workers.get_mut(&world.sims[n].id).unwrap().name = name.into();
+    }
+    let ids: Vec<WorkerId> = world.sims.iter().map(|s| s.id).collect();
+    let quarantined = |world: &World, n: usize| world.farm.workers()[&ids[n]].quarantined.clone();
+    let mismatch = |world: &mut World, unit: u32, n: usize| {
+        let held = world.sims[n].held.keys().next().copied().unwrap_or(Epoch(0));
+        let at_unit = UnitAt { job: job_id(1), pass: 2, unit, epoch: held };
+        let m = Mismatch { edges: 3, index: 17, expected: 0.5, found: 0.25 };
+        world.farm.start_mismatched(at_unit, ids[n], &m, at(1.0))
+    };
+    // The unit is free for others, who can do it; it counts for nothing against it.
+    let unit = world.sims[1].held.values().next().unwrap().2.first().unwrap();
+    assert_eq!(mismatch(&mut world, unit, 1), None);
+    let why = quarantined(&world, 1).expect("quarantined");
+    for part in [&format!("unit {unit} of pass 2"), "sample 17", "3 edges", "0.5", "0.25", "same binary"] {
+        assert!(why.contains(part), "{part} is not in: {why}");
+    }
+    let pass = world.farm.job(job_id(1)).unwrap().pass.as_ref().unwrap();
+    assert!(pass.board.free().contains(unit) && pass.failures.is_empty());
+    assert!(world.farm.attention(job_id(1), at(1.0)).iter().any(|a| a.contains("sample 17")));
+    // The same machine again proves nothing new: its other units, or the worker after another start.
+    assert_eq!(mismatch(&mut world, unit + 1, 1), None);
+    assert_eq!(mismatch(&mut world, unit, 2), None);
+    assert!(quarantined(&world, 2).is_some() && quarantined(&world, 0).is_none());
+    // A second machine: the pools are wrong, and nobody is to blame for noticing.
+    let why = mismatch(&mut world, unit + 2, 3).expect("the job fails");
+    for part in ["workers odd and other", "pools", "are wrong", "submit the job again", "sample 17"] {
+        assert!(why.contains(part), "{part} is not in: {why}");
+    }
+    assert!((0..4).all(|n| quarantined(&world, n).is_none()));
 }

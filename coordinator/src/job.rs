@@ -1,7 +1,8 @@
 //! A job as the scheduler sees it.
 
-use crate::ids::JobId;
+use crate::ids::{JobId, WorkerId};
 use crate::lease::PassBoard;
+use crate::mismatch::Disagreement;
 use renderer::film::Counters;
 use renderer::job::{PassPlan, RenderSettings};
 use renderer::scene::bundle::Digest;
@@ -111,6 +112,8 @@ pub struct Pass {
     pub board: PassBoard,
     /// Why units failed, by unit.
     pub failures: BTreeMap<u32, Vec<String>>,
+    /// Workers that disagree with the pools that the pass's chains start from.
+    pub mismatches: BTreeMap<WorkerId, Disagreement>,
 }
 
 /// A job.

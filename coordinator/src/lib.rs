@@ -13,6 +13,7 @@ pub mod job;
 pub mod lease;
 mod merge;
 mod merging;
+mod mismatch;
 pub mod outcome;
 pub mod registry;
 mod serve;

@@ -133,6 +133,12 @@ impl Worker {
         }
     }
 
+    /// Whether it runs on the same machine as another, by name and address: a worker that was started again is a new one.
+    pub fn same_machine(&self, other: &Self) -> bool {
+        let host = |w: &Self| w.address.rsplit_once(':').map_or(w.address.clone(), |(host, _)| host.to_string());
+        self.name == other.name && host(self) == host(other)
+    }
+
     /// What `workers` shows as its state.
     pub fn state_name(&self) -> &'static str {
         match self.state {

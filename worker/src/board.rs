@@ -1,6 +1,7 @@
 //! What the threads of a worker share: its leases, the units that run, the outcomes that wait to be delivered.
 
 use crate::convert::{Grant, Revocation};
+use renderer::integrator::mmlt::Mismatch;
 use renderer::job::document::PassDocument;
 use renderer::job::{Stop, Unit};
 use renderer::scene::Scene;
@@ -39,6 +40,15 @@ pub struct Task {
     pub stop: Arc<Stop>,
 }
 
+/// Why a unit has no result.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// For people.
+    pub message: String,
+    /// Set when the start of a chain is not what the pool says.
+    pub mismatch: Option<Mismatch>,
+}
+
 /// What came of a unit.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -53,7 +63,7 @@ pub struct Outcome {
     /// Compute time.
     pub seconds: f64,
     /// Its bytes, or why there are none.
-    pub result: Result<bytes::Bytes, String>,
+    pub result: Result<bytes::Bytes, Failure>,
 }
 
 impl Outcome {
@@ -219,7 +229,7 @@ impl Board {
     }
 
     /// A unit has ended; `None`: it was stopped.
-    pub fn finished(&self, task: &Task, seconds: f64, result: Option<Result<bytes::Bytes, String>>) {
+    pub fn finished(&self, task: &Task, seconds: f64, result: Option<Result<bytes::Bytes, Failure>>) {
         let mut inner = self.lock();
         let unit = task.unit.id;
         let Some(lease) = inner.leases.get_mut(&task.epoch) else { return };

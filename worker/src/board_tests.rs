@@ -27,7 +27,7 @@ fn held(board: &Board) -> Vec<(u64, Vec<u32>)> {
     board.held().into_iter().map(|h| (h.epoch, h.units)).collect()
 }
 
-fn done(text: &'static str) -> Option<Result<bytes::Bytes, String>> {
+fn done(text: &'static str) -> Option<Result<bytes::Bytes, Failure>> {
     Some(Ok(bytes::Bytes::from_static(text.as_bytes())))
 }
 

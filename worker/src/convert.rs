@@ -2,6 +2,7 @@
 
 use crate::board::{Held, Outcome};
 use bytes::Bytes;
+use renderer::integrator::mmlt::Mismatch;
 use renderer::scene::bundle::Digest;
 use std::ops::Range;
 use uuid::Uuid;
@@ -67,11 +68,18 @@ pub fn id(id: Uuid) -> Bytes {
     Bytes::copy_from_slice(id.as_bytes())
 }
 
+fn mismatch(m: &Mismatch) -> proto::StartMismatch {
+    proto::StartMismatch { edges: m.edges, sample: m.index, expected: m.expected, found: m.found }
+}
+
 /// An outcome in parts.
 pub fn parts(worker: Uuid, o: &Outcome) -> Vec<proto::OutcomePart> {
-    let (data, failure) = match &o.result {
-        Ok(data) => (data.clone(), String::new()),
-        Err(message) => (Bytes::new(), if message.is_empty() { "unknown".into() } else { message.clone() }),
+    let (data, failure, mismatch) = match &o.result {
+        Ok(data) => (data.clone(), String::new(), None),
+        Err(f) => {
+            let message = if f.message.is_empty() { "unknown".into() } else { f.message.clone() };
+            (Bytes::new(), message, f.mismatch.as_ref().map(self::mismatch))
+        }
     };
     let head = proto::OutcomeHead {
         worker_id: id(worker),
@@ -83,6 +91,7 @@ pub fn parts(worker: Uuid, o: &Outcome) -> Vec<proto::OutcomePart> {
         len: data.len() as u64,
         digest: if failure.is_empty() { Digest::of(&data).0.to_vec().into() } else { Bytes::new() },
         failure,
+        mismatch,
     };
     let first = data.slice(..data.len().min(proto::CHUNK));
     let mut parts = vec![proto::OutcomePart { head: Some(head), data: first }];

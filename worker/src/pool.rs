@@ -1,6 +1,6 @@
 //! The compute threads.
 
-use crate::board::{Board, Task};
+use crate::board::{Board, Failure, Task};
 use renderer::job::{UnitError, run_unit};
 use std::io;
 use std::sync::Arc;
@@ -26,9 +26,11 @@ fn work(board: &Board, task: &Task) {
     let result = match run_unit(&task.context.scene, &d.settings, &d.plan, &task.unit, &task.stop) {
         Ok(result) => Some(Ok(result.encode().into())),
         Err(UnitError::Stopped) => None,
-        Err(e @ (UnitError::Panicked { .. } | UnitError::Mismatch { .. })) => {
+        Err(e) => {
             tracing::error!("{e}");
-            Some(Err(e.to_string()))
+            let message = e.to_string();
+            let mismatch = if let UnitError::Mismatch { source, .. } = e { Some(source) } else { None };
+            Some(Err(Failure { message, mismatch }))
         }
     };
     board.finished(task, began.elapsed().as_secs_f64(), result);

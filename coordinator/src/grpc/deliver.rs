@@ -221,11 +221,15 @@ fn same(hub: &Arc<Hub>, head: &Head, stored: Digest) -> Verdict {
     Verdict::Mismatch
 }
 
-/// Counts a failure; the third of a unit fails the job.
+/// Counts a failure; the third of a unit fails the job. A start of a chain that is not what the pool says is the worker's fault, or
+/// the pool's.
 async fn fail(hub: &Arc<Hub>, head: &Head, message: &str) -> Result<(), Status> {
     let at = head.at;
     tracing::warn!(job = %at.job, pass = at.pass, unit = at.unit, worker = %head.worker, "a unit failed: {message}");
-    let fails = hub.with(|farm, now| farm.unit_failed(at, head.worker, message, now));
+    let fails = hub.with(|farm, now| match &head.mismatch {
+        Some(mismatch) => farm.start_mismatched(at, head.worker, mismatch, now),
+        None => farm.unit_failed(at, head.worker, message, now),
+    });
     if let Some(why) = fails {
         tracing::error!(job = %at.job, "failed: {why}");
         hub.set_state(at.job, JobState::Failed, &why).await.map_err(super::jobs::control_status)?;
