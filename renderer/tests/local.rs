@@ -107,3 +107,21 @@ fn a_target_error_is_met_when_the_job_says_so() {
     let actual = (squared / image.mean.len() as f64 / 3.0).sqrt();
     assert!(actual <= 0.05 && actual > 0.01, "promised 0.05, found {actual}");
 }
+
+#[test]
+fn a_depth_limit_may_leave_nothing_to_chains() {
+    let scene = scene();
+    for depth in [0, 1, 2] {
+        let limited = |kind| RenderOptions { max_depth: Some(depth), ..RenderOptions::counting(kind, 32) };
+        let of = |kind| {
+            let options = RenderOptions { size: Some((40, 20)), ..limited(kind) };
+            common::render_with(&scene, &RenderSettings::resolve(&options, &scene.defaults).unwrap(), 2)
+        };
+        let (path, mmlt) = (of(IntegratorKind::Path), of(IntegratorKind::Mmlt));
+        if depth == 0 {
+            assert!(mmlt.mean.iter().flatten().all(|v| *v == 0.0));
+        } else {
+            common::assert_same_mean(&path, &mmlt, 0.1, &format!("depth {depth}"));
+        }
+    }
+}

@@ -100,7 +100,10 @@ pub fn pilot(settings: &RenderSettings) -> PassPlan {
     let samples =
         pool_samples(settings, PILOT_SHARE, first_mutations(settings)).clamp(MIN_PILOT, f64::from(1 << 22)) as u32;
     let first = GroupRange { replicate: 0, start: 0, end: 1, closes: false };
-    let parts = vec![Part::Samples(first), Part::Bootstrap { replicate: 0, samples }];
+    let mut parts = vec![Part::Samples(first)];
+    if !lengths.is_empty() {
+        parts.push(Part::Bootstrap { replicate: 0, samples });
+    }
     let depths = lengths.iter().map(|k| Depth { edges: *k, techniques: vec![1.0; *k as usize + 1] }).collect();
     let columns = settings.width.div_ceil(TARGET_CELL);
     let chains = ChainConstants { depths, columns, target: Vec::new(), threshold: 0.0 };
@@ -110,7 +113,7 @@ pub fn pilot(settings: &RenderSettings) -> PassPlan {
 /// Pool samples that cost the given share of so many mutations per pixel. A sample traces both walks, and a path of every length in
 /// about every second way; a mutation, one path of a short length.
 fn pool_samples(settings: &RenderSettings, share: f64, mpp: u32) -> f64 {
-    let longest = f64::from(*lengths(settings).end()).min(TYPICAL_LONGEST);
+    let longest = f64::from(*lengths(settings).end()).clamp(1.0, TYPICAL_LONGEST);
     let cost = (2.0 * longest + 0.25 * longest * longest) / TYPICAL_EDGES;
     share * f64::from(mpp) * pixels(settings) / cost
 }
@@ -208,7 +211,9 @@ impl Metropolis {
         direct: impl Fn(usize) -> [f64; 3],
     ) -> Option<PassPlan> {
         let pass = before.pass + 1;
-        if pass == 1 {
+        // A depth limit may leave nothing to chains.
+        let empty = lengths(settings).is_empty();
+        if pass == 1 && !empty {
             let chains = self.learn(settings, direct);
             let parts = Self::pools_of(settings, first_mutations(settings));
             return Some(plan(settings, pass, parts, chains, 0, false));
@@ -228,7 +233,7 @@ impl Metropolis {
         }
         let mut parts = self.chains_of(settings, pass, size, done, last && fixed_budget(settings).is_some());
         self.pools.clear();
-        if !last {
+        if !last && !empty {
             parts.extend(Self::pools_of(settings, ((done + size) / 10).max(FIRST_PASS)));
         }
         Some(plan(settings, pass, parts, chains, size, last))
