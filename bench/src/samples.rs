@@ -14,7 +14,7 @@ pub struct Args {
     /// The scenes.
     #[arg(default_value = "scenes/cornell.toml")]
     scenes: Vec<PathBuf>,
-    /// Samples per pixel.
+    /// Samples per pixel, or mutations.
     #[arg(long, default_value_t = 64)]
     spp: u32,
     /// Side of the square picture in pixels.
@@ -31,8 +31,10 @@ pub struct Row {
     scene: String,
     integrator: &'static str,
     threads: usize,
-    /// Samples (light paths) per second, median.
+    /// Samples (light paths; of mmlt, samples of all kinds and mutations) per second, median.
     samples_per_s: f64,
+    /// Mutations per second over the whole render, pools and ordinary samples included in its time; 0 without chains.
+    mutations_per_s: f64,
     rays_per_s: f64,
     /// `sqrt(mean of variance / (I^2 + 0.01))`.
     relative_error: f64,
@@ -50,7 +52,7 @@ pub fn run(args: &Args) -> Result<Vec<Row>, String> {
         let (source, root) = DiskSource::for_scene(path).map_err(|e| format!("{}: {e}", path.display()))?;
         let (scene, _) = Scene::load(&source, &root).map_err(|e| e.to_string())?;
         let load_s = started.elapsed().as_secs_f64();
-        for integrator in [IntegratorKind::Path, IntegratorKind::Light] {
+        for &(_, integrator) in IntegratorKind::ALL {
             for threads in [1, 2] {
                 rows.push(time(args, path.display().to_string(), &scene, integrator, threads, load_s)?);
             }
@@ -67,12 +69,7 @@ fn time(
     threads: usize,
     load_s: f64,
 ) -> Result<Row, String> {
-    let options = RenderOptions {
-        integrator: Some(integrator),
-        spp: Some(args.spp),
-        size: Some((args.side, args.side)),
-        ..Default::default()
-    };
+    let options = RenderOptions { size: Some((args.side, args.side)), ..RenderOptions::counting(integrator, args.spp) };
     let settings = RenderSettings::resolve(&options, &scene.defaults).map_err(|e| e.to_string())?;
     let mut seconds = Vec::new();
     let mut image = None;
@@ -80,17 +77,19 @@ fn time(
         let started = Instant::now();
         let outcome = render_local(scene, &settings, &LocalOptions { threads }, &Stop::new(), &mut |_| {});
         seconds.push(started.elapsed().as_secs_f64());
-        image = Some(outcome.map_err(|e| e.to_string())?.image);
+        image = Some(outcome.map_err(|e| e.to_string())?);
     }
     seconds.sort_by(f64::total_cmp);
     let median = seconds[seconds.len() / 2];
-    let image = image.ok_or("no run was asked for")?;
+    let outcome = image.ok_or("no run was asked for")?;
+    let (image, chains) = (outcome.image, outcome.chains);
     let relative_error = image.error.map_or(f64::NAN, |e| e.relative);
     Ok(Row {
         scene: name,
         integrator: integrator.name(),
         threads,
         samples_per_s: image.counters.samples as f64 / median,
+        mutations_per_s: (chains.small + chains.large) as f64 / median,
         rays_per_s: image.counters.rays as f64 / median,
         relative_error,
         error2_seconds: relative_error * relative_error * median,
@@ -100,13 +99,16 @@ fn time(
 
 /// The rows as a table.
 pub fn table(rows: &[Row]) -> String {
-    let mut text = String::from("integrator  threads   ksamples/s  krays/s   rel. error  error^2 x s  load s  scene");
+    let mut text = String::from(
+        "integrator  threads   ksamples/s  kmutations/s  krays/s   rel. error  error^2 x s  load s  scene",
+    );
     for r in rows {
         text += &format!(
-            "\n{:10}  {:7}  {:11.1}  {:7.0}  {:11.5}  {:11.6}  {:6.2}  {}",
+            "\n{:10}  {:7}  {:11.1}  {:12.1}  {:7.0}  {:11.5}  {:11.6}  {:6.2}  {}",
             r.integrator,
             r.threads,
             r.samples_per_s / 1e3,
+            r.mutations_per_s / 1e3,
             r.rays_per_s / 1e3,
             r.relative_error,
             r.error2_seconds,
