@@ -24,6 +24,8 @@ pub enum FoldError {
     Mismatch(u32),
 }
 
+/// Samples per pixel (mutations) of each group before its error is believed.
+const CHECKPOINT_SAMPLES: u32 = 8;
 /// Contributions of a bidirectional connection below this share of the image's mean are left to chance.
 const CONNECTION_SHARE: f64 = 0.02;
 
@@ -217,8 +219,9 @@ impl Merger {
     /// A target is met when the error's upper bound is below it at two checkpoints (ends of passes) in a row.
     fn target_met(&mut self) -> bool {
         let Some(target) = self.settings.budget.target_error else { return false };
-        // Pilots and pools are no checkpoints.
-        if self.plan.spp() == 0 {
+        // Pilots and pools are no checkpoints, and groups of a few samples can't tell what all of them have missed, such as pixels on
+        // the rim of a lamp.
+        if self.plan.spp() == 0 || self.done_spp < CHECKPOINT_SAMPLES * self.settings.replicates {
             return false;
         }
         let met = self.image().error.is_some_and(|e| e.upper95 <= target);
