@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 pub struct ErrorSummary {
     /// `sqrt(mean over pixels and channels of variance / (I^2 + 0.01))`.
     pub relative: f64,
-    /// Upper end of its one-sided 95 % interval (Student's t over the groups).
+    /// Upper end of its one-sided 95 % interval (Student's t over the groups), or, where that is larger, the error with the intensities
+    /// of half of the groups under the variance of the other half. A pixel that few samples have found bright raises its own
+    /// intensity as well as its variance, which caps its part of `relative`; halves know nothing of each other.
     pub upper95: f64,
     /// Mean of all pixels and channels.
     pub mean: f64,
@@ -101,6 +103,8 @@ struct GroupScatter {
     moves: Vec<f64>,
     present: Vec<bool>,
     mean: f64,
+    /// Sum of variances over the intensities of other groups.
+    held_out: f64,
     /// Pixels with at least two groups, times three channels.
     terms: f64,
 }
@@ -112,6 +116,7 @@ impl GroupScatter {
             moves: vec![0.0; groups],
             present: vec![false; groups],
             mean: 0.0,
+            held_out: 0.0,
             terms: 0.0,
         }
     }
@@ -123,6 +128,7 @@ impl GroupScatter {
             return;
         }
         self.terms += 3.0;
+        self.held_out += held_out(values, n);
         for (group, (v, n_g)) in values {
             self.present[*group] = true;
             for c in 0..3 {
@@ -149,12 +155,34 @@ impl GroupScatter {
         let upper = squared + t95_one_sided(count as usize - 1) * squared_se;
         Some(ErrorSummary {
             relative: squared.sqrt(),
-            upper95: upper.sqrt(),
+            upper95: upper.max(self.held_out / self.terms).sqrt(),
             mean: self.mean / all,
             mean_se,
             groups: count as u32,
         })
     }
+}
+
+/// Sum over channels of a pixel's variance over `I^2 + 0.01`: each half of the groups gives its part of the variance, the other half I.
+/// 0 with fewer than four groups.
+fn held_out(values: &[(usize, ([f64; 3], f64))], n: f64) -> f64 {
+    if values.len() < 4 {
+        return 0.0;
+    }
+    let half = |odd: bool, c: usize| {
+        let of = || values.iter().filter(move |v| (v.0 % 2 == 1) == odd).map(move |v| (v.1.0[c], v.1.1));
+        let (count, weight) = of().fold((0.0, 0.0), |(k, w), v| (k + 1.0, w + v.1));
+        let mean = of().map(|v| v.0 * v.1).sum::<f64>() / weight;
+        let scatter: f64 = of().map(|v| v.1 * (v.0 - mean) * (v.0 - mean)).sum();
+        // Its part of the variance of the mean over all groups.
+        (mean, weight * scatter / ((count - 1.0) * n * n))
+    };
+    let of_channel = |c: usize| {
+        let ((mean_a, var_a), (mean_b, var_b)) = (half(false, c), half(true, c));
+        let part = |var: f64, other: f64| if var > 0.0 { var / (other * other + 0.01) } else { 0.0 };
+        part(var_a, mean_b) + part(var_b, mean_a)
+    };
+    (0..3).map(of_channel).sum()
 }
 
 /// 95 % quantile of Student's t distribution.
