@@ -171,7 +171,10 @@ fn held_out(values: &[(usize, ([f64; 3], f64))], n: f64) -> f64 {
     }
     let half = |odd: bool, c: usize| {
         let of = || values.iter().filter(move |v| (v.0 % 2 == 1) == odd).map(move |v| (v.1.0[c], v.1.1));
-        let (count, weight) = of().fold((0.0, 0.0), |(k, w), v| (k + 1.0, w + v.1));
+        let (count, weight) = of().fold((0.0f64, 0.0f64), |(k, w), v| (k + 1.0, w + v.1));
+        if count < 2.0 {
+            return (0.0, 0.0);
+        }
         let mean = of().map(|v| v.0 * v.1).sum::<f64>() / weight;
         let scatter: f64 = of().map(|v| v.1 * (v.0 - mean) * (v.0 - mean)).sum();
         // Its part of the variance of the mean over all groups.
