@@ -2,7 +2,7 @@
 
 use crate::exit::Failure;
 use crate::options::OutputArgs;
-use crate::progress::{duration, quantity};
+use crate::progress::{duration, quantity, samples_name};
 use crate::save;
 use renderer::film::exr::{self, Provenance};
 use renderer::film::{Counters, ErrorSummary, MergedImage, png};
@@ -111,7 +111,9 @@ impl Summary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let c = &self.counters;
-        write!(f, "{} x {} pixels, {:.1} spp in {}", self.width, self.height, self.spp, duration(self.seconds))?;
+        let samples = samples_name(self.integrator == IntegratorKind::Mmlt);
+        write!(f, "{} x {} pixels, {:.1} {samples} per pixel", self.width, self.height, self.spp)?;
+        write!(f, " in {}", duration(self.seconds))?;
         write!(f, ", {}rays/s", quantity(self.rays_per_s))?;
         match self.error {
             Some(e) => write!(f, ", relative error {:.4} (below {:.4} at 95 %)", e.relative, e.upper95)?,

@@ -124,6 +124,11 @@ impl Progress {
     }
 }
 
+/// What an image's samples are called: of chains, nearly all are mutations.
+pub fn samples_name(chains: bool) -> &'static str {
+    if chains { "samples and mutations" } else { "samples" }
+}
+
 /// A number with three digits and k, M, G.
 pub fn quantity(v: f64) -> String {
     let (scaled, unit) = match v {

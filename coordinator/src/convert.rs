@@ -182,7 +182,8 @@ pub fn status(farm: &Farm, job: &Job, now: Duration) -> proto::JobStatus {
     let waits = || farm.attention(job.id, now).into_iter().next().unwrap_or_default();
     let message = if job.message.is_empty() { waits() } else { job.message.clone() };
     // Without a sample budget the share is that of the pass, and says nothing of the end.
-    let left = rates.filter(|(_, f)| *f > 0.0 && s.settings.budget.spp.is_some()).map(|(_, f)| (1.0 - p.fraction) / f);
+    let counted = s.settings.budget.spp.or(s.settings.budget.mpp).is_some();
+    let left = rates.filter(|(_, f)| *f > 0.0 && counted).map(|(_, f)| (1.0 - p.fraction) / f);
     proto::JobStatus {
         id: job.id.to_string(),
         name: s.name.clone(),

@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Decoded results that wait in memory for their turn; more are read from the disk again.
+/// Decoded results that wait in memory for their turn, and bytes of them; more are read from the disk again.
 const DECODED: usize = 64;
+const DECODED_BYTES: usize = 256 << 20;
 /// The error is worth its computation once in so long.
 const ERROR_EVERY: Duration = Duration::from_secs(1);
 
@@ -35,6 +36,7 @@ pub struct Merging {
     merger: Merger,
     waiting: BTreeMap<u32, StoredResult>,
     decoded: BTreeMap<u32, Box<UnitResult>>,
+    decoded_bytes: usize,
     segment: Option<(u32, SegmentReader)>,
     /// Bytes folded since the last checkpoint.
     folded_bytes: u64,
@@ -74,6 +76,7 @@ impl Merging {
             merger,
             waiting: BTreeMap::new(),
             decoded: BTreeMap::new(),
+            decoded_bytes: 0,
             segment: None,
             folded_bytes: 0,
             checkpoint,
@@ -125,8 +128,12 @@ impl Merging {
         self.waiting.insert(at.unit, at);
         if let Some(d) = decoded
             && self.decoded.len() < DECODED
+            && (self.decoded.is_empty() || self.decoded_bytes + d.memory() <= DECODED_BYTES)
         {
-            self.decoded.insert(at.unit, d);
+            self.decoded_bytes += d.memory();
+            if let Some(old) = self.decoded.insert(at.unit, d) {
+                self.decoded_bytes -= old.memory();
+            }
         }
     }
 
@@ -138,7 +145,10 @@ impl Merging {
         let unit = self.merger.next_unit();
         let Some(at) = self.waiting.get(&unit).copied() else { return Step::Waits };
         let result = match self.decoded.remove(&unit) {
-            Some(result) => Ok(*result),
+            Some(result) => {
+                self.decoded_bytes -= result.memory();
+                Ok(*result)
+            }
             None => self.read(store, &at),
         };
         let folded = result.and_then(|r| self.merger.fold(unit, &r).map_err(|e| StoreError::Fault(e.to_string())));

@@ -2,7 +2,7 @@
 
 use crate::exit::Outcome;
 use crate::farm::picture::{self, Fetched};
-use crate::farm::view::{spp, state_line};
+use crate::farm::view::{samples, state_line};
 use crate::farm::{Farm, JobArgs};
 use crate::options::OutputArgs;
 use crate::output::Console;
@@ -38,7 +38,8 @@ pub fn save(image: &Fetched, output: &OutputArgs, console: &Console) -> Outcome 
     value["complete"] = image.complete.into();
     value["exr"] = exr.display().to_string().into();
     value["png"] = png.display().to_string().into();
-    let text = format!("{} x {} pixels, {:.1} spp\n{}\n{}", s.width, s.height, spp(s), exr.display(), png.display());
+    let text =
+        format!("{} x {} pixels, {} per pixel\n{}\n{}", s.width, s.height, samples(s), exr.display(), png.display());
     console.result(text, &value);
     failure.map_or(Ok(()), Err)
 }

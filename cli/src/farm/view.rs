@@ -1,8 +1,9 @@
 //! Jobs and workers as text.
 
-use crate::progress::{duration, quantity};
+use crate::progress::{duration, quantity, samples_name};
 use proto::json::state_name;
 use proto::{JobDetail, JobState, JobStatus, WorkerStatus};
+use renderer::integrator::IntegratorKind;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Rows with aligned columns; the last column is not padded.
@@ -67,7 +68,7 @@ pub fn detail(d: &JobDetail) -> String {
     let Some(s) = &d.status else { return String::new() };
     let mut lines = vec![format!("{}  {}", s.id, s.name), format!("state       {}", state_line(s))];
     lines.push(format!("image       {} x {}, {}", s.width, s.height, s.integrator));
-    lines.push(format!("samples     {:.1} per pixel, {} rays", spp(s), quantity(s.rays as f64).trim()));
+    lines.push(format!("sampling    {} per pixel, {} rays", samples(s), quantity(s.rays as f64).trim()));
     if s.units > 0 {
         lines.push(format!(
             "pass        {}: {} of {} units stored, {} merged",
@@ -95,7 +96,7 @@ pub fn detail(d: &JobDetail) -> String {
 
 /// One line on how far a job is.
 pub fn state_line(s: &JobStatus) -> String {
-    let mut text = format!("{}, {:.0} %, {:.1} spp", state_name(s.state()), 100.0 * s.fraction, spp(s));
+    let mut text = format!("{}, {:.0} %, {} per pixel", state_name(s.state()), 100.0 * s.fraction, samples(s));
     if s.state() == JobState::Active {
         text += &format!(", {} samples/s on {} workers", quantity(s.rate), s.workers);
         if let Some(left) = s.seconds_left {
@@ -109,6 +110,11 @@ pub fn state_line(s: &JobStatus) -> String {
         text += &format!(": {}", s.message);
     }
     text
+}
+
+/// How many samples each pixel has, and of which kind.
+pub fn samples(s: &JobStatus) -> String {
+    format!("{:.1} {}", spp(s), samples_name(s.integrator == IntegratorKind::Mmlt.name()))
 }
 
 /// Samples per pixel that are in the image.
@@ -142,6 +148,9 @@ mod tests {
             message: "no worker is connected".into(),
             ..Default::default()
         };
-        assert_eq!(state_line(&s), "active, 25 %, 2.5 spp, 0.00 samples/s on 0 workers: no worker is connected");
+        assert_eq!(
+            state_line(&s),
+            "active, 25 %, 2.5 samples per pixel, 0.00 samples/s on 0 workers: no worker is connected"
+        );
     }
 }

@@ -2,7 +2,8 @@ use super::{SplatSums, TileSums};
 
 /// The film of one replicate group: a complete, independent estimate of the image.
 ///
-/// Open, it holds f64 sums (28 bytes a pixel); closed, the mean in f32 (12 bytes a pixel).
+/// Open, it holds f64 sums (28 bytes a pixel of tiles, 24 of splats, 52 of both); closed, the mean in f32 (12 bytes a pixel). Where
+/// samples are the budget, one group is open at a time; where time or error is, all are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GroupFilm {
     /// No sample yet.

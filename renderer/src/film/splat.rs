@@ -39,6 +39,11 @@ impl SplatSums {
         self.index.len()
     }
 
+    /// Bytes of memory that the touched blocks take.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.data[..])
+    }
+
     /// Adds `value` to pixel (x, y), which must lie on the film.
     #[inline]
     pub fn add(&mut self, x: u32, y: u32, value: Rgb) {

@@ -104,6 +104,9 @@ impl Merger {
             if self.plan.chain_weight > 0 {
                 let radiance = std::mem::take(&mut self.metropolis.pending);
                 group.add_chains(&radiance, pixels, f64::from(self.plan.chain_weight));
+                if part.closes || part.replicate > 0 {
+                    self.metropolis.forget_preview();
+                }
             }
             if part.closes {
                 group.close(pixels);
@@ -144,7 +147,7 @@ impl Merger {
                 self.light_sums.iter_mut().zip(&result.light_sums).for_each(|(to, from)| *to += from);
             }
             (UnitKind::Bootstrap { .. }, None, splats) if splats.as_ref().is_none_or(fits) => {
-                let added = self.metropolis.add_bootstrap(&self.settings, &self.plan, unit.replicate, result);
+                let added = self.metropolis.add_bootstrap(&self.settings, &self.plan, &unit, result);
                 added.ok_or(FoldError::Mismatch(id))?;
             }
             (UnitKind::Chains { part, .. }, None, Some(splats)) if fits(splats) => {

@@ -12,7 +12,7 @@
 
 use super::plan::{GroupRange, Part, PassPlan, Sampling};
 use super::settings::RenderSettings;
-use super::unit::UnitResult;
+use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{GroupFilm, SplatSums};
 use crate::integrator::mmlt::{ChainConstants, ChainStart, Depth, TARGET_CELL};
 use crate::math::pow64;
@@ -81,11 +81,14 @@ impl Pool {
     }
 }
 
-/// What a Metropolis job has learned.
+/// What a Metropolis job has learned. In memory, beside the groups' films: 24 bytes a pixel for the pilot's picture (until chains have
+/// made a better one), 24 for what is pending, 16 a found path of the pools (at most 2^20 samples, some paths each).
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Metropolis {
     /// The pilot's picture: mean radiance of the paths that chains carry.
     pub pilot: Vec<[f64; 3]>,
+    /// Samples of the pilot that are in its picture, and how many it has.
+    pub pilot_samples: (u32, u32),
     /// The pilot's sums of targets by path length and technique.
     pub techniques: BTreeMap<u32, Vec<f64>>,
     /// The pools under way, by replicate and path length.
@@ -160,9 +163,10 @@ impl Metropolis {
         &mut self,
         settings: &RenderSettings,
         plan: &PassPlan,
-        replicate: u32,
+        unit: &Unit,
         result: &UnitResult,
     ) -> Option<()> {
+        let (replicate, UnitKind::Bootstrap { start, end }) = (unit.replicate, unit.kind) else { return None };
         let sums = result.bootstrap.as_ref()?;
         let samples = plan.parts.iter().find_map(|p| match p {
             Part::Bootstrap { replicate: r, samples } if *r == replicate => Some(*samples),
@@ -190,6 +194,7 @@ impl Metropolis {
             let totals = self.techniques.entry(depth.edges).or_insert_with(|| vec![0.0; sums.len()]);
             totals.iter_mut().zip(sums).for_each(|(to, from)| *to += from / f64::from(samples));
         }
+        self.pilot_samples = (self.pilot_samples.0 + (end - start), samples);
         if let Some(splats) = &result.splats {
             let width = settings.width as usize;
             self.pilot.resize(width * settings.height as usize, [0.0; 3]);
@@ -352,6 +357,11 @@ impl Metropolis {
         }
     }
 
+    /// The pilot's picture is of no use once there is a better one.
+    pub fn forget_preview(&mut self) {
+        self.pilot = Vec::new();
+    }
+
     /// What is known before the first chains are done: the pilot over the first group's ordinary samples. `None` once a group is complete.
     pub fn preview(&self, width: u32, height: u32, groups: &[GroupFilm]) -> Option<GroupFilm> {
         let incomplete = |g: &GroupFilm| matches!(g, GroupFilm::Empty) || g.pixel(0).1 == 0.0;
@@ -362,7 +372,11 @@ impl Metropolis {
         if matches!(film, GroupFilm::Closed { .. }) {
             return None;
         }
-        film.replace_chains(&self.pilot, width as usize * height as usize);
+        // While the pilot is under way (or was stopped), its picture is that of the samples it has.
+        let (done, all) = self.pilot_samples;
+        let scale = f64::from(all) / f64::from(done.max(1));
+        let scaled: Vec<[f64; 3]> = self.pilot.iter().map(|v| v.map(|c| c * scale)).collect();
+        film.replace_chains(&scaled, width as usize * height as usize);
         Some(film)
     }
 }
@@ -375,6 +389,7 @@ impl Metropolis {
             out.extend((film.len() as u64).to_le_bytes());
             out.extend_from_slice(bytemuck::cast_slice(film));
         }
+        [self.pilot_samples.0, self.pilot_samples.1].iter().for_each(|n| out.extend(u64::from(*n).to_le_bytes()));
         out.extend((self.techniques.len() as u64).to_le_bytes());
         for (edges, sums) in &self.techniques {
             out.extend(u64::from(*edges).to_le_bytes());
@@ -401,6 +416,8 @@ impl Metropolis {
             Some(raw.chunks_exact(24).map(bytemuck::pod_read_unaligned).collect::<Vec<[f64; 3]>>())
         };
         let (pilot, pending) = (film()?, film()?);
+        let mut count = || u32::try_from(r.length()?).ok();
+        let pilot_samples = (count()?, count()?);
         let mut techniques = BTreeMap::new();
         for _ in 0..r.length()? {
             let (edges, n) = (u32::try_from(r.length()?).ok()?, r.length()?);
@@ -420,7 +437,7 @@ impl Metropolis {
             pools.insert(key, Pool { samples, found: raw.chunks_exact(16).map(entry).collect() });
         }
         *bytes = r.0;
-        Some(Self { pilot, techniques, pools, pending })
+        Some(Self { pilot, pilot_samples, techniques, pools, pending })
     }
 }
 

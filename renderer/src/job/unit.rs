@@ -72,3 +72,13 @@ pub struct UnitResult {
     /// What was met.
     pub counters: Counters,
 }
+
+impl UnitResult {
+    /// Bytes of memory that its sums take, about.
+    pub fn memory(&self) -> usize {
+        let tile = self.tile.as_ref().map_or(0, |t| size_of_val(&t.sums[..]) + size_of_val(&t.aovs[..]));
+        let splats = self.splats.as_ref().map_or(0, SplatSums::memory);
+        let found = self.bootstrap.as_ref().map_or(0, |b| size_of_val(&b.found[..]));
+        tile + splats + found
+    }
+}
