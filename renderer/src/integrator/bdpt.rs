@@ -1,10 +1,9 @@
 //! Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, chapter 10): every way to make a path from a walk from the
 //! camera and one from a light, combined by multiple importance sampling.
 
-use super::UnitContext;
+use super::{UnitContext, tile};
 use crate::film::{Aov, Counters, Rect, SplatSums, TileSums};
-use crate::math::{Ray, Vec2};
-use crate::path::mis::Heuristic;
+use crate::math::Ray;
 use crate::path::{Connection, Subpath, Tracer, VertexKind};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
@@ -35,14 +34,7 @@ pub struct Bidirectional<'a> {
 impl<'a> Bidirectional<'a> {
     /// For a unit.
     pub fn new(c: &UnitContext<'a>) -> Self {
-        let tracer = Tracer {
-            scene: c.scene,
-            camera: &c.view.camera,
-            selector: c.selector,
-            rr_depth: Some(c.rr_depth),
-            heuristic: Heuristic::Power,
-            counters: Counters::default(),
-        };
+        let tracer = c.tracer(Some(c.rr_depth));
         let max_depth = c.max_depth as usize;
         Self { tracer, max_depth, threshold: c.threshold, camera: Subpath::default(), light: Subpath::default() }
     }
@@ -166,40 +158,20 @@ pub fn render_tile(
     splats: &mut SplatSums,
     counters: &mut Counters,
 ) -> Option<TileSums> {
-    let mut sums = Vec::with_capacity(rect.area());
-    let mut aovs = Vec::with_capacity(if c.replicate == 0 { rect.area() } else { 0 });
     let mut bdpt = Bidirectional::new(c);
     let mut film = Film { c, pixel: Rgb::ZERO, splats };
-    for (x, y) in rect.pixels() {
-        if x == rect.x0 && (c.stopped)() {
-            return None;
-        }
-        let mut sum = [0.0f64; 3];
-        let mut aov = Aov::default();
-        let pixel = u64::from(y) * u64::from(c.view.width) + u64::from(x);
-        for index in samples.clone() {
-            let mut sampler = SobolSampler::new(c.seed, c.replicate, pixel, index);
-            let mut light_sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + pixel, index);
-            let raster = c.view.filter.sample(sampler.next_2d(), x, y);
-            let lens = if c.view.camera.is_pinhole() { Vec2::ZERO } else { sampler.next_2d() };
-            let ray = c.view.camera.generate_ray(raster, lens);
-            film.pixel = Rgb::ZERO;
-            bdpt.sample(ray, &mut sampler, &mut light_sampler, &mut film);
-            for (to, from) in sum.iter_mut().zip(film.pixel.to_array()) {
-                *to += f64::from(from);
-            }
-            if c.replicate == 0 {
-                first_hit(&mut aov, bdpt.camera_walk());
-            }
-        }
-        sums.push(Rgb::from(sum.map(|v| v as f32)));
-        if c.replicate == 0 {
-            aovs.push(aov);
-        }
-    }
-    counters.add(&bdpt.counters());
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
-    Some(TileSums { rect, samples: samples.end - samples.start, sums, aovs })
+    let tile = tile::render(c, rect, samples, |mut s| {
+        let mut light_sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + s.pixel, s.index);
+        film.pixel = Rgb::ZERO;
+        bdpt.sample(s.ray, &mut s.sampler, &mut light_sampler, &mut film);
+        if let Some(aov) = s.aov {
+            first_hit(aov, bdpt.camera_walk());
+        }
+        film.pixel
+    })?;
+    counters.add(&bdpt.counters());
+    Some(tile)
 }
 
 /// What the first surface is, for the auxiliary images.

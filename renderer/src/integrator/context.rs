@@ -1,6 +1,10 @@
 use crate::camera::Camera;
-use crate::film::Filter;
+use crate::film::{Counters, Filter};
 use crate::light::LightSelector;
+use crate::math::{Ray, Vec2};
+use crate::path::Tracer;
+use crate::path::mis::Heuristic;
+use crate::sampling::Sampler;
 use crate::scene::Scene;
 use crate::scene::desc::FilterDesc;
 
@@ -42,6 +46,28 @@ impl Carried {
     #[inline]
     pub fn has(self, edges: u32) -> bool {
         edges <= self.up_to || edges > self.beyond
+    }
+}
+
+impl<'a> UnitContext<'a> {
+    /// Traces and connects walks for the unit; Russian roulette may end them from `rr_depth` edges on, if at all.
+    pub fn tracer(&self, rr_depth: Option<u32>) -> Tracer<'a> {
+        Tracer {
+            scene: self.scene,
+            camera: &self.view.camera,
+            selector: self.selector,
+            rr_depth,
+            heuristic: Heuristic::Power,
+            counters: Counters::default(),
+        }
+    }
+
+    /// The camera ray of a sample of pixel (x, y), by the sampler's first numbers.
+    #[inline]
+    pub fn camera_ray(&self, sampler: &mut impl Sampler, x: u32, y: u32) -> Ray {
+        let raster = self.view.filter.sample(sampler.next_2d(), x, y);
+        let lens = if self.view.camera.is_pinhole() { Vec2::ZERO } else { sampler.next_2d() };
+        self.view.camera.generate_ray(raster, lens)
     }
 }
 

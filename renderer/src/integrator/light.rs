@@ -6,7 +6,6 @@
 use super::UnitContext;
 use crate::film::{Counters, SplatSums};
 use crate::math::{Anchor, Ray, Vec2};
-use crate::path::mis::Heuristic;
 use crate::path::{Subpath, Tracer};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
@@ -27,14 +26,7 @@ pub fn trace_paths(
     counters: &mut Counters,
 ) -> Option<Vec<f64>> {
     counters.samples += paths.end - paths.start;
-    let tracer = Tracer {
-        scene: c.scene,
-        camera: &c.view.camera,
-        selector: c.selector,
-        rr_depth: Some(c.rr_depth),
-        heuristic: Heuristic::Power,
-        counters: Counters::default(),
-    };
+    let tracer = c.tracer(Some(c.rr_depth));
     let mut film = Film { c, tracer, splats, light_sums: vec![0.0; c.scene.lights.len()] };
     let mut walk = Subpath::default();
     for path in paths {

@@ -6,6 +6,7 @@ pub mod light;
 pub mod mmlt;
 pub mod path;
 pub mod strategies;
+mod tile;
 
 pub use context::{Carried, UnitContext, View};
 

@@ -1,45 +1,22 @@
 //! Unidirectional path tracing: next-event estimation and BSDF sampling, combined by multiple importance sampling
 //! (Kajiya 1986; Veach 1997, chapter 9).
 
-use super::UnitContext;
+use super::{UnitContext, tile};
 use crate::bsdf::{ShadingPoint, Transport};
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::Interaction;
-use crate::math::{Ray, Vec2, Vec3};
+use crate::math::{Ray, Vec3};
 use crate::path::{power_heuristic, roulette};
-use crate::sampling::{Sampler, SobolSampler};
+use crate::sampling::Sampler;
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
 /// Renders samples `samples` of each pixel of a tile; `None` when stopped.
 pub fn render_tile(c: &UnitContext<'_>, rect: Rect, samples: Range<u32>, counters: &mut Counters) -> Option<TileSums> {
-    let mut sums = Vec::with_capacity(rect.area());
-    let mut aovs = Vec::with_capacity(if c.replicate == 0 { rect.area() } else { 0 });
-    for (x, y) in rect.pixels() {
-        if x == rect.x0 && (c.stopped)() {
-            return None;
-        }
-        let mut sum = [0.0f64; 3];
-        let mut aov = Aov::default();
-        let pixel = u64::from(y) * u64::from(c.view.width) + u64::from(x);
-        for index in samples.clone() {
-            let mut sampler = SobolSampler::new(c.seed, c.replicate, pixel, index);
-            let raster = c.view.filter.sample(sampler.next_2d(), x, y);
-            let lens = if c.view.camera.is_pinhole() { Vec2::ZERO } else { sampler.next_2d() };
-            let ray = c.view.camera.generate_ray(raster, lens);
-            let mut walk = Walk { c, counters, sampler, aov: (c.replicate == 0).then_some(&mut aov) };
-            let radiance = walk.radiance(ray);
-            for (to, from) in sum.iter_mut().zip(radiance.to_array()) {
-                *to += f64::from(from);
-            }
-        }
-        sums.push(Rgb::from(sum.map(|v| v as f32)));
-        if c.replicate == 0 {
-            aovs.push(aov);
-        }
-    }
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
-    Some(TileSums { rect, samples: samples.end - samples.start, sums, aovs })
+    tile::render(c, rect, samples, |s| {
+        Walk { c, counters: &mut *counters, sampler: s.sampler, aov: s.aov }.radiance(s.ray)
+    })
 }
 
 /// How the path came to where it is, for the weight of light that it runs into.

@@ -3,10 +3,8 @@
 
 use super::UnitContext;
 use super::bdpt::{Bidirectional, Sink};
-use crate::math::Vec2;
 use crate::path::Connection;
-use crate::sampling::SobolSampler;
-use crate::sampling::{Sampler, hash_words};
+use crate::sampling::{SobolSampler, hash_words};
 use std::ops::Range;
 
 /// Edges of the longest path that is told apart.
@@ -53,9 +51,7 @@ impl Strategies {
                 for index in samples.clone() {
                     let mut camera = SobolSampler::new(c.seed, c.replicate, pixel, index);
                     let mut light = SobolSampler::new(c.seed, c.replicate, hash_words(&[pixel]), index);
-                    let raster = c.view.filter.sample(camera.next_2d(), x, y);
-                    let lens = if c.view.camera.is_pinhole() { Vec2::ZERO } else { camera.next_2d() };
-                    let ray = c.view.camera.generate_ray(raster, lens);
+                    let ray = c.camera_ray(&mut camera, x, y);
                     bdpt.sample(ray, &mut camera, &mut light, &mut Film { c, sums: &mut sums, at: pixel as usize });
                 }
             }

@@ -1,5 +1,6 @@
 //! Unit results as bytes: byte planes of f32 sums, LZ4. The identity of a result is the digest of these bytes.
 
+use super::bytes::Reader;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Aov, BLOCK, Counters, SplatSums, TileSums};
 use crate::integrator::mmlt::{BootstrapSums, ChainStats, Found};
@@ -195,23 +196,4 @@ fn from_planes(planes: &[u8], count: usize) -> Option<Vec<f32>> {
     let byte = |plane: usize, i: usize| planes[plane * count + i];
     (planes.len() == count * 4)
         .then(|| (0..count).map(|i| f32::from_le_bytes(std::array::from_fn(|p| byte(p, i)))).collect())
-}
-
-/// Takes numbers off the front of a byte slice.
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
-        let (head, tail) = self.0.split_at_checked(n)?;
-        self.0 = tail;
-        Some(head)
-    }
-
-    fn u32(&mut self) -> Option<u32> {
-        self.take(4)?.try_into().ok().map(u32::from_le_bytes)
-    }
-
-    fn u64(&mut self) -> Option<u64> {
-        self.take(8)?.try_into().ok().map(u64::from_le_bytes)
-    }
 }

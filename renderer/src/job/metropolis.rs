@@ -10,6 +10,7 @@
 //! `b` and the starts of one chain always come from the same pool, which keeps `b` times the mean splat unbiased whatever the length of
 //! the chains. Their *number* may depend on the pools: systematic resampling gives the same expectation for any number of starts.
 
+use super::bytes::Reader;
 use super::plan::{GroupRange, Part, PassPlan, Sampling};
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind, UnitResult};
@@ -421,7 +422,7 @@ impl Metropolis {
         let mut techniques = BTreeMap::new();
         for _ in 0..r.length()? {
             let (edges, n) = (u32::try_from(r.length()?).ok()?, r.length()?);
-            let sums = (0..n).map(|_| r.word().map(f64::from_bits)).collect::<Option<Vec<_>>>()?;
+            let sums = (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>()?;
             techniques.insert(edges, sums);
         }
         let mut pools = BTreeMap::new();
@@ -438,24 +439,5 @@ impl Metropolis {
         }
         *bytes = r.0;
         Some(Self { pilot, pilot_samples, techniques, pools, pending })
-    }
-}
-
-/// Takes numbers off the front of a byte slice.
-struct Reader<'a>(&'a [u8]);
-
-impl<'a> Reader<'a> {
-    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
-        let (head, tail) = self.0.split_at_checked(n)?;
-        self.0 = tail;
-        Some(head)
-    }
-
-    fn word(&mut self) -> Option<u64> {
-        self.take(8)?.try_into().ok().map(u64::from_le_bytes)
-    }
-
-    fn length(&mut self) -> Option<usize> {
-        usize::try_from(self.word()?).ok()
     }
 }

@@ -1,5 +1,6 @@
 //! A job: settings, passes, units, results and their merge. The same code runs in `lightfarm render` and on the farm.
 
+mod bytes;
 mod codec;
 pub mod document;
 mod local;

@@ -112,10 +112,11 @@ fn run(
         UnitKind::Paths { start, end } => {
             let mut splats = SplatSums::new(settings.width, settings.height);
             let sums = integrator::light::trace_paths(&context, start..end, &mut splats, &mut result.counters);
+            let done = sums.is_some();
             result.light_sums = sums.unwrap_or_default();
             result.paths = end - start;
             result.splats = Some(splats);
-            !(context.stopped)()
+            done
         }
         UnitKind::Bootstrap { start, end } => {
             let Some(constants) = &plan.chains else { return Ok(None) };

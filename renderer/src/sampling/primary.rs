@@ -137,12 +137,6 @@ impl PrimarySpace {
         }
     }
 
-    /// Whether the proposal under way is independent of the current point.
-    #[inline]
-    pub fn is_large(&self) -> bool {
-        self.large
-    }
-
     /// The proposal becomes the current point.
     #[inline]
     pub fn accept(&mut self) {

@@ -2,7 +2,6 @@ use super::constants::{ChainConstants, MmltOptions};
 use crate::film::{Counters, SplatSums};
 use crate::integrator::UnitContext;
 use crate::math::Vec2;
-use crate::path::mis::Heuristic;
 use crate::path::{Connection, Subpath, Tracer};
 use crate::sampling::{Discrete, IndependentSampler, PrimarySpace, Sampler, StepSizes, Stream, hash_words};
 use crate::spectrum::Rgb;
@@ -104,14 +103,7 @@ impl<'a, 'b> Pool<'a, 'b> {
         Self {
             c,
             constants,
-            tracer: Tracer {
-                scene: c.scene,
-                camera: &c.view.camera,
-                selector: c.selector,
-                rr_depth: None,
-                heuristic: Heuristic::Power,
-                counters: Counters::default(),
-            },
+            tracer: c.tracer(None),
             sizes: StepSizes::new(f64::from(options.step_min), f64::from(options.step_max)),
             tables: constants.depths.iter().map(|d| d.table(c.scene)).collect(),
             size: Vec2::new(c.view.width as f32, c.view.height as f32),

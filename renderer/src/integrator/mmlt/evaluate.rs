@@ -1,8 +1,7 @@
 use super::constants::{ChainConstants, MmltOptions};
 use crate::integrator::UnitContext;
 use crate::math::Vec2;
-use crate::path::mis::Heuristic;
-use crate::path::{Connection, Counters, Subpath, Tracer};
+use crate::path::{Connection, Subpath, Tracer};
 use crate::sampling::{Discrete, PrimarySpace, Sampler, StepSizes, Stream};
 use crate::spectrum::Rgb;
 
@@ -37,14 +36,7 @@ impl<'a> Evaluator<'a> {
     pub fn new(c: &UnitContext<'a>, constants: &'a ChainConstants, options: &MmltOptions, edges: u32) -> Option<Self> {
         let techniques = constants.depth(edges)?.table(c.scene)?;
         Some(Self {
-            tracer: Tracer {
-                scene: c.scene,
-                camera: &c.view.camera,
-                selector: c.selector,
-                rr_depth: None,
-                heuristic: Heuristic::Power,
-                counters: Counters::default(),
-            },
+            tracer: c.tracer(None),
             constants,
             size: Vec2::new(c.view.width as f32, c.view.height as f32),
             edges: edges as usize,
