@@ -4,7 +4,8 @@ use crate::exit::Failure;
 use clap::Args;
 use renderer::integrator::IntegratorKind;
 use renderer::integrator::mmlt::MmltOptions;
-use renderer::job::RenderOptions;
+use renderer::job::{RenderOptions, RenderSettings, SettingsError};
+use renderer::scene::desc::RenderDefaults;
 use std::path::{Path, PathBuf};
 
 /// What to render: `render` and `submit` take it.
@@ -41,19 +42,23 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// For the renderer.
-    pub fn to_options(&self) -> RenderOptions {
-        RenderOptions {
+    /// The settings for a scene that asks for `scene`.
+    pub fn resolve(&self, scene: &RenderDefaults) -> Result<RenderSettings, Failure> {
+        let options = RenderOptions {
             integrator: self.integrator,
             spp: self.spp,
             mpp: self.mpp,
-            mmlt: self.mmlt.unwrap_or_default(),
+            mmlt: self.mmlt,
             time_s: self.time,
             target_error: self.target_error,
             size: self.size,
             max_depth: self.max_depth,
             seed: self.seed,
-        }
+        };
+        RenderSettings::resolve(&options, scene).map_err(|e| match e {
+            SettingsError::Options(m) => Failure::Usage(format!("error: {m}")),
+            SettingsError::Settings(m) => Failure::Input(format!("error: {m}")),
+        })
     }
 }
 

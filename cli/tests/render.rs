@@ -5,6 +5,7 @@
 mod common;
 
 use common::{Lab, Run, read};
+use renderer::integrator::IntegratorKind;
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -58,6 +59,7 @@ fn wrong_command_lines_are_usage_errors() {
         &["render", "scene.xml", "--integrator", "paht"],
         &["render", "scene.xml", "--threads", "0"],
         &["render", "scene.xml", "-o", "same.png", "--png", "same.png"],
+        &["render", "scene.xml", "--size", "65536x65536"],
         &["frobnicate"],
         &[],
     ] {
@@ -66,6 +68,49 @@ fn wrong_command_lines_are_usage_errors() {
     }
     assert!(lab.run(&["render", "scene.xml", "--integrator", "paht"]).status(2).contains("did you mean"));
     assert!(lab.run(&["--help"]).stdout().contains("exit status"));
+}
+
+#[test]
+fn options_that_do_not_go_together_are_usage_errors() {
+    let lab = Lab::new();
+    lab.write(
+        "mmlt.toml",
+        "camera = { from = [0, 0, 5], to = [0, 0, 0] }\n[render]\nintegrator = 'mmlt'\n[[lights]]\nkind = 'constant'\n",
+    );
+    for (args, advice) in [
+        (&["scene.xml", "--mpp", "3"][..], "give --spp in place of --mpp"),
+        (&["scene.xml", "--mpp", "3", "--integrator", "light"], "give --spp in place of --mpp"),
+        (&["scene.xml", "--mpp", "3", "--integrator", "bdpt"], "give --spp in place of --mpp"),
+        (&["scene.xml", "--spp", "3", "--integrator", "mmlt"], "give --mpp in place of --spp"),
+        (&["mmlt.toml", "--spp", "3"], "give --mpp in place of --spp"),
+        (&["scene.xml", "--mmlt", "plain"], "give --integrator mmlt"),
+        (&["mmlt.toml", "--mmlt", "", "--integrator", "path"], "give --integrator mmlt"),
+        (&["scene.xml", "--integrator", "mmlt", "--mmlt", "lift=3"], "between 0 and 1"),
+    ] {
+        // A farm is asked nothing before the options are found to fit, so none is needed.
+        for verb in [&["render"][..], &["submit", "--coordinator", "http://127.0.0.1:1"]] {
+            let stderr = lab.run(&[verb, args].concat()).status(2);
+            assert!(stderr.contains(advice), "{verb:?} {args:?}: {stderr}");
+        }
+    }
+    let strategies = |scene| lab.run(&["render", scene, "--strategies", "folder"]).status(2);
+    assert!(strategies("scene.xml").contains("give --integrator bdpt"));
+    assert!(strategies("mmlt.toml").contains("give --integrator bdpt"));
+}
+
+#[test]
+fn scenes_name_the_integrators_that_there_are() {
+    let lab = Lab::new();
+    let info = |name: &str| {
+        lab.write("scene.toml", &format!("camera = {{ from = [0, 0, 5], to = [0, 0, 0] }}\n[render]\nintegrator = '{name}'\n[[lights]]\nkind = 'constant'\n"));
+        lab.run(&["info", "scene.toml"])
+    };
+    for (name, _) in IntegratorKind::ALL {
+        info(name).status(0);
+    }
+    let stderr = info("auto").status(1);
+    let known: Vec<_> = IntegratorKind::ALL.iter().map(|(name, _)| *name).collect();
+    assert!(stderr.contains("scene.toml, line 3") && stderr.contains(&known.join(", ")), "{stderr}");
 }
 
 #[test]

@@ -95,7 +95,7 @@ fn both_merges(scene: &Scene, settings: &RenderSettings) -> (Telling, Telling) {
 fn a_pooled_b_is_found_out() {
     let scene = scene("stress/glossy-cornell.toml");
     // The chains as published, so that the merge's factor is all that b does.
-    let mmlt = MmltOptions { kelemen: false, lift: 0.0, direct_edges: 0, ..MmltOptions::default() };
+    let mmlt = Some(MmltOptions { kelemen: false, lift: 0.0, direct_edges: 0, ..MmltOptions::default() });
     let options = RenderOptions { mmlt, max_depth: Some(4), ..RenderOptions::counting(IntegratorKind::Mmlt, 256) };
     let path = RenderOptions { max_depth: Some(4), ..RenderOptions::counting(IntegratorKind::Path, 512) };
     let reference = renders(&scene, &path, 32, 1 << 32);

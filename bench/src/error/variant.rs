@@ -85,7 +85,7 @@ impl Variant {
             options.mpp = budget.mpp.or(budget.spp);
             let text = |t: &Tuning| t.value.as_ref().map_or(t.key.clone(), |v| format!("{}={v}", t.key));
             let tuning: Vec<String> = self.tuning.iter().map(text).collect();
-            options.mmlt = tuning.join(",").parse().map_err(|e| format!("{}: {e}", self.name))?;
+            options.mmlt = Some(tuning.join(",").parse().map_err(|e| format!("{}: {e}", self.name))?);
             return Ok(options);
         }
         options.spp = budget.spp;

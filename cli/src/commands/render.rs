@@ -43,8 +43,7 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     let pictures = Pictures::new(&args.output, &args.scene)?;
     pictures.check()?;
     let loaded = scene_file::load(&args.scene, console)?;
-    let settings = RenderSettings::resolve(&args.render.to_options(), &loaded.scene.defaults)
-        .map_err(|e| Failure::Input(format!("error: {e}")))?;
+    let settings = args.render.resolve(&loaded.scene.defaults)?;
     let (manifest, _) = loaded.files.into_bundle(loaded.root);
     let options = LocalOptions { threads: args.threads.count() };
     if let Some(folder) = &args.strategies {

@@ -6,7 +6,7 @@ use crate::farm::{Farm, FarmArgs, picture, upload};
 use crate::options::{OutputArgs, RenderArgs};
 use crate::output::Console;
 use crate::{save, scene_file, signals};
-use renderer::job::{RenderSettings, Stop};
+use renderer::job::Stop;
 use std::path::PathBuf;
 use uuid::Uuid;
 
@@ -44,8 +44,7 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     }
     let farm = Farm::open(&args.farm)?;
     let loaded = scene_file::load(&args.scene, console)?;
-    let settings = RenderSettings::resolve(&args.render.to_options(), &loaded.scene.defaults)
-        .map_err(|e| Failure::Input(format!("error: {e}")))?;
+    let settings = args.render.resolve(&loaded.scene.defaults)?;
     let lights = u32::try_from(loaded.scene.light_count()).unwrap_or(u32::MAX);
     drop(loaded.scene);
     let (manifest, blobs) = loaded.files.into_bundle(loaded.root);

@@ -55,7 +55,7 @@ pub struct RenderOptions {
     /// `--mpp`
     pub mpp: Option<u32>,
     /// `--mmlt`
-    pub mmlt: MmltOptions,
+    pub mmlt: Option<MmltOptions>,
     /// `--time`, seconds
     pub time_s: Option<f64>,
     /// `--target-error`
@@ -75,12 +75,31 @@ impl RenderOptions {
         let (spp, mpp) = if chains { (None, Some(n)) } else { (Some(n), None) };
         Self { integrator: Some(integrator), spp, mpp, ..Self::default() }
     }
+
+    /// Checks that they go together, and with the integrator that they or the scene chose.
+    fn check(&self, integrator: IntegratorKind) -> Result<(), String> {
+        check_counts(integrator, self.spp, self.mpp)?;
+        if self.mmlt.is_some() && integrator != IntegratorKind::Mmlt {
+            let name = integrator.name();
+            return Err(format!(
+                "--mmlt is for mmlt, but {name} would render; leave it out, or give --integrator mmlt"
+            ));
+        }
+        self.mmlt.map_or(Ok(()), |o| o.validate())?;
+        self.size.map_or(Ok(()), |(width, height)| check_size(width, height))
+    }
 }
 
 /// Settings that can't be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct SettingsError(pub String);
+pub enum SettingsError {
+    /// What the command line says makes no sense, by itself or with the integrator.
+    #[error("{0}")]
+    Options(String),
+    /// Anything else.
+    #[error("{0}")]
+    Settings(String),
+}
 
 /// The largest film, in pixels: 2^28 (16384 x 16384).
 pub const MAX_PIXELS: u64 = 1 << 28;
@@ -95,8 +114,9 @@ impl RenderSettings {
         let from_scene = || scene.integrator.as_deref().map(str::parse::<IntegratorKind>);
         let integrator = match options.integrator {
             Some(k) => k,
-            None => from_scene().transpose().map_err(SettingsError)?.unwrap_or(IntegratorKind::Path),
+            None => from_scene().transpose().map_err(SettingsError::Settings)?.unwrap_or(IntegratorKind::Path),
         };
+        options.check(integrator).map_err(SettingsError::Options)?;
         let budget = budget(options, scene, integrator);
         let (width, height) = options.size.or(scene.size).unwrap_or((768, 432));
         let depth = options.max_depth.or(scene.max_depth).unwrap_or(-1);
@@ -112,7 +132,7 @@ impl RenderSettings {
             rr_depth: scene.rr_depth.unwrap_or(5),
             seed: options.seed.or(scene.seed).unwrap_or(0),
             replicates: budget.spp.map_or(groups, |n| groups.min(n.max(1))),
-            mmlt: options.mmlt,
+            mmlt: options.mmlt.unwrap_or_default(),
         };
         settings.validate()?;
         Ok(settings)
@@ -126,14 +146,8 @@ impl RenderSettings {
 
     /// Checks what came over the wire or from a user.
     pub fn validate(&self) -> Result<(), SettingsError> {
-        let fail = |m: String| Err(SettingsError(m));
-        let pixels = u64::from(self.width) * u64::from(self.height);
-        if pixels == 0 || pixels > MAX_PIXELS || self.width > 1 << 16 || self.height > 1 << 16 {
-            return fail(format!(
-                "a picture of {} x {} pixels can't be rendered; sides go from 1 to 65536, the area to {MAX_PIXELS}",
-                self.width, self.height
-            ));
-        }
+        let fail = |m: String| Err(SettingsError::Settings(m));
+        check_size(self.width, self.height).or_else(fail)?;
         let b = &self.budget;
         if b.spp.is_none() && b.mpp.is_none() && b.time_s.is_none() && b.target_error.is_none() {
             return fail(
@@ -146,19 +160,8 @@ impl RenderSettings {
         if b.mpp == Some(0) || b.mpp.is_some_and(|n| n > 1 << 24) {
             return fail(format!("--mpp {} is out of range; it goes from 1 to {}", b.mpp.unwrap_or(0), 1 << 24));
         }
-        let chains = self.integrator == IntegratorKind::Mmlt;
-        if chains && b.spp.is_some() {
-            return fail("mmlt makes mutations, not samples; give --mpp in place of --spp".into());
-        }
-        if !chains && b.mpp.is_some() {
-            return fail(format!(
-                "{} makes samples, not mutations; give --spp in place of --mpp",
-                self.integrator.name()
-            ));
-        }
-        if let Err(m) = self.mmlt.validate() {
-            return fail(m);
-        }
+        check_counts(self.integrator, b.spp, b.mpp).or_else(fail)?;
+        self.mmlt.validate().or_else(fail)?;
         if b.time_s.is_some_and(|t| !(t > 0.0 && t.is_finite())) {
             return fail("--time must be a positive number of seconds".into());
         }
@@ -168,11 +171,31 @@ impl RenderSettings {
         if self.replicates == 0 || self.replicates > 64 {
             return fail(format!("{} replicate groups are out of range; they go from 1 to 64", self.replicates));
         }
-        if let Err(m) = self.filter.validate() {
-            return fail(m);
-        }
-        Ok(())
+        self.filter.validate().or_else(fail)
     }
+}
+
+/// Checks the size of a film.
+fn check_size(width: u32, height: u32) -> Result<(), String> {
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > MAX_PIXELS || width > 1 << 16 || height > 1 << 16 {
+        return Err(format!(
+            "a picture of {width} x {height} pixels can't be rendered; sides go from 1 to 65536, the area to {MAX_PIXELS}"
+        ));
+    }
+    Ok(())
+}
+
+/// Checks that a budget counts what the integrator makes.
+fn check_counts(integrator: IntegratorKind, spp: Option<u32>, mpp: Option<u32>) -> Result<(), String> {
+    let chains = integrator == IntegratorKind::Mmlt;
+    if chains && spp.is_some() {
+        return Err("mmlt makes mutations, not samples; give --mpp in place of --spp".into());
+    }
+    if !chains && mpp.is_some() {
+        return Err(format!("{} makes samples, not mutations; give --spp in place of --mpp", integrator.name()));
+    }
+    Ok(())
 }
 
 /// What ends the job: the command line, else the scene's samples per pixel (as mutations, where the integrator makes those).
@@ -191,5 +214,7 @@ fn budget(options: &RenderOptions, scene: &RenderDefaults, integrator: Integrato
 }
 
 fn bad_depth(depth: i32) -> SettingsError {
-    SettingsError(format!("--max-depth {depth} is out of range; it counts edges from 0, and -1 means unbounded"))
+    SettingsError::Settings(format!(
+        "--max-depth {depth} is out of range; it counts edges from 0, and -1 means unbounded"
+    ))
 }

@@ -86,13 +86,18 @@ pub enum FilterDesc {
 }
 
 impl FilterDesc {
-    /// Checks that the filter has a usable radius (more than 0, at most 8 pixels).
+    /// The largest radius in pixels.
+    pub const MAX_RADIUS: f32 = 8.0;
+    /// The largest standard deviation, whose radius is that.
+    pub const MAX_STDDEV: f32 = 2.0;
+
+    /// Checks that the filter has a usable radius.
     pub fn validate(&self) -> Result<(), String> {
         let (what, v, limit) = match *self {
-            Self::Box { radius } => ("radius of the box filter", radius, 8.0),
-            Self::Tent { radius } => ("radius of the tent filter", radius, 8.0),
-            Self::Gaussian { stddev } => ("standard deviation of the Gaussian filter", stddev, 2.0),
-            Self::BlackmanHarris { radius } => ("radius of the Blackman-Harris filter", radius, 8.0),
+            Self::Box { radius } => ("radius of the box filter", radius, Self::MAX_RADIUS),
+            Self::Tent { radius } => ("radius of the tent filter", radius, Self::MAX_RADIUS),
+            Self::Gaussian { stddev } => ("standard deviation of the Gaussian filter", stddev, Self::MAX_STDDEV),
+            Self::BlackmanHarris { radius } => ("radius of the Blackman-Harris filter", radius, Self::MAX_RADIUS),
         };
         if v > 0.0 && v <= limit {
             Ok(())

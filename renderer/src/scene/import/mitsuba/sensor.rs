@@ -158,11 +158,13 @@ impl Builder<'_, '_, '_> {
         }
         let mut reader = self.reader(id);
         let importer = &mut *self.importer;
-        let bound = Bound::Between(1e-3, 16.0);
+        let mut number =
+            |key, most, default| reader.float_or(importer, key, Bound::Between(1e-3, f64::from(most)), default) as f32;
+        let mut radius = |default| number("radius", FilterDesc::MAX_RADIUS, default);
         let filter = match node.plugin.as_str() {
-            "box" => FilterDesc::Box { radius: reader.float_or(importer, "radius", bound, 0.5) as f32 },
-            "tent" => FilterDesc::Tent { radius: reader.float_or(importer, "radius", bound, 1.0) as f32 },
-            _ => FilterDesc::Gaussian { stddev: reader.float_or(importer, "stddev", bound, 0.5) as f32 },
+            "box" => FilterDesc::Box { radius: radius(0.5) },
+            "tent" => FilterDesc::Tent { radius: radius(1.0) },
+            _ => FilterDesc::Gaussian { stddev: number("stddev", FilterDesc::MAX_STDDEV, 0.5) },
         };
         reader.finish(importer, self.document, &[]);
         Some(filter)
@@ -172,7 +174,7 @@ impl Builder<'_, '_, '_> {
     fn sampler(&mut self, sensor: &mut Reader) {
         for (_, id) in sensor.children(self.document, "sampler") {
             let mut reader = self.reader(id);
-            let count = reader.integer(self.importer, "sample_count", 1, 1 << 30);
+            let count = reader.integer(self.importer, "sample_count", 1, 1 << 24);
             let seed = reader.integer(self.importer, "seed", 0, i64::MAX);
             reader.finish(self.importer, self.document, &SAMPLER_HARMLESS);
             let defaults = &mut self.importer.scene.defaults;

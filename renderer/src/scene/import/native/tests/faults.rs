@@ -25,6 +25,12 @@ fn wrong_keys_are_named_with_the_nearest() {
     fault("[materials.a]\nreflectance = 1", 2, 1, &["the material \"a\" has no `kind`"]);
     fault("[render]\nxyzzy = 1", 3, 1, &["known are: filter, integrator, max_depth"]);
     fault("[render]\nintegrator = 'paht'", 3, 14, &["did you mean \"path\"?"]);
+    fault(
+        "[render]\nintegrator = 'auto'",
+        3,
+        14,
+        &["`integrator` is \"auto\", expected one of: path, light, bdpt, mmlt"],
+    );
     let scene = "[[shapes]]\nkind = 'cube'\nmaterial = 'wod'\n[materials.wood]\nkind = 'diffuse'";
     fault(scene, 4, 12, &["no material is called \"wod\"", "did you mean \"wood\"?"]);
     let scene = "[[shapes]]\nkind = 'cube'\ntransform = [{ translat = [1, 2, 3] }]";
@@ -50,6 +56,8 @@ fn wrong_values_name_their_place() {
     fault("[materials.a]\nkind = 'diffuse'\nreflectance = '#12'", 4, 15, &["#rrggbb"]);
     fault("[materials.a]\nkind = 'conductor'\nmetal = 'Gold'", 4, 9, &["no metal is called \"Gold\""]);
     fault("[render]\nspp = 0", 3, 7, &["from 1 to"]);
+    fault("[render]\nfilter = { kind = 'tent', radius = 9 }", 3, 36, &["from 0.01 to 8"]);
+    fault("[render]\nfilter = { kind = 'gaussian', stddev = 3 }", 3, 40, &["from 0.01 to 2"]);
     fault("[render]\nsize = [1.5, 2]", 3, 9, &["`size` is 1.5", "whole number"]);
     fault("[render]\nseed = 99999999999999999999", 3, 8, &["`seed`"]);
     fault("[textures.t]\nkind = 'image'\nfile = 'no.png'", 4, 8, &["\"no.png\"", "no such file"]);
