@@ -2,7 +2,7 @@
 
 use crate::exit::Failure;
 use crate::options::OutputArgs;
-use crate::progress::{duration, quantity, samples_name};
+use crate::progress::{duration, quantity};
 use crate::save;
 use renderer::film::exr::{self, Provenance};
 use renderer::film::{Counters, ErrorSummary, MergedImage, png};
@@ -111,7 +111,7 @@ impl Summary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let c = &self.counters;
-        let samples = samples_name(self.integrator == IntegratorKind::Mmlt);
+        let samples = self.integrator.sample_name();
         write!(f, "{} x {} pixels, {:.1} {samples} per pixel", self.width, self.height, self.spp)?;
         write!(f, " in {}", duration(self.seconds))?;
         write!(f, ", {}rays/s", quantity(self.rays_per_s))?;

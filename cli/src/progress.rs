@@ -17,8 +17,10 @@ const JSON_INTERVAL: Duration = Duration::from_secs(1);
 pub struct Moment {
     /// Share of the budget that is done, as far as it is known.
     pub fraction: f64,
-    /// Samples (or light paths) so far.
+    /// Samples (light paths, mutations) so far.
     pub samples: u64,
+    /// What they are called.
+    pub samples_name: &'static str,
     /// Pixels of the film.
     pub pixels: u64,
     /// The error when it was last estimated.
@@ -112,8 +114,9 @@ impl Progress {
     }
 
     fn describe(&self, m: &Moment) -> String {
-        let spp = m.samples as f64 / m.pixels as f64;
-        let mut text = format!("{spp:.1} spp, {} samples/s", quantity(m.samples as f64 / self.seconds()));
+        let per_pixel = m.samples as f64 / m.pixels as f64;
+        let rate = quantity(m.samples as f64 / self.seconds());
+        let mut text = format!("{per_pixel:.1} {} per pixel, {rate} per second", m.samples_name);
         if let Some(left) = self.left(m) {
             text += &format!(", {} left", duration(left));
         }
@@ -122,11 +125,6 @@ impl Progress {
         }
         text
     }
-}
-
-/// What an image's samples are called: of chains, nearly all are mutations.
-pub fn samples_name(chains: bool) -> &'static str {
-    if chains { "samples and mutations" } else { "samples" }
 }
 
 /// A number with three digits and k, M, G.

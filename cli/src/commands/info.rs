@@ -181,7 +181,7 @@ impl fmt::Display for Info {
         )?;
         let s = &self.settings;
         let budget = match (s.budget.spp, s.budget.mpp) {
-            (Some(n), _) => format!("{n} spp"),
+            (Some(n), _) => format!("{n} samples per pixel"),
             (_, Some(n)) => format!("{n} mutations per pixel"),
             _ => "-".into(),
         };

@@ -128,9 +128,10 @@ impl Session<'_> {
         // Of several budgets, the one that is nearest to its end tells how far the job is.
         let time = self.settings.budget.time_s.map_or(0.0, |t| self.progress.seconds() / t);
         let counted = self.settings.budget.spp.or(self.settings.budget.mpp).is_some();
-        let spp = if counted { merger.fraction() } else { 0.0 };
-        let fraction = if merger.finished() { 1.0 } else { spp.max(time).min(1.0) };
+        let count = if counted { merger.fraction() } else { 0.0 };
+        let fraction = if merger.finished() { 1.0 } else { count.max(time).min(1.0) };
         let samples = merger.counters().samples;
-        self.progress.show(&Moment { fraction, samples, pixels, error: preview.error() });
+        let samples_name = self.settings.integrator.sample_name();
+        self.progress.show(&Moment { fraction, samples, samples_name, pixels, error: preview.error() });
     }
 }

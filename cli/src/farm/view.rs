@@ -1,6 +1,6 @@
 //! Jobs and workers as text.
 
-use crate::progress::{duration, quantity, samples_name};
+use crate::progress::{duration, quantity};
 use proto::json::state_name;
 use proto::{JobDetail, JobState, JobStatus, WorkerStatus};
 use renderer::integrator::IntegratorKind;
@@ -24,7 +24,7 @@ fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
 
 /// `lightfarm jobs`.
 pub fn jobs(list: &[JobStatus]) -> String {
-    let mut rows = vec![row(["ID", "NAME", "STATE", "PRIORITY", "DONE", "SPP", "WORKERS", "TIME", "SUBMITTED"])];
+    let mut rows = vec![row(["ID", "NAME", "STATE", "PRIORITY", "DONE", "PER PIXEL", "WORKERS", "TIME", "SUBMITTED"])];
     for s in list {
         rows.push(vec![
             s.id.clone(),
@@ -32,7 +32,7 @@ pub fn jobs(list: &[JobStatus]) -> String {
             state_name(s.state()).into(),
             s.priority.to_string(),
             format!("{:.0} %", 100.0 * s.fraction),
-            format!("{:.1}", spp(s)),
+            samples(s),
             s.workers.to_string(),
             duration(s.seconds),
             ago(s.submitted_unix_ms),
@@ -98,7 +98,7 @@ pub fn detail(d: &JobDetail) -> String {
 pub fn state_line(s: &JobStatus) -> String {
     let mut text = format!("{}, {:.0} %, {} per pixel", state_name(s.state()), 100.0 * s.fraction, samples(s));
     if s.state() == JobState::Active {
-        text += &format!(", {} samples/s on {} workers", quantity(s.rate), s.workers);
+        text += &format!(", {} per second on {} workers", quantity(s.rate), s.workers);
         if let Some(left) = s.seconds_left {
             text += &format!(", {} left", duration(left));
         }
@@ -114,12 +114,8 @@ pub fn state_line(s: &JobStatus) -> String {
 
 /// How many samples each pixel has, and of which kind.
 pub fn samples(s: &JobStatus) -> String {
-    format!("{:.1} {}", spp(s), samples_name(s.integrator == IntegratorKind::Mmlt.name()))
-}
-
-/// Samples per pixel that are in the image.
-pub fn spp(s: &JobStatus) -> f64 {
-    s.samples as f64 / (f64::from(s.width) * f64::from(s.height)).max(1.0)
+    let per_pixel = s.samples as f64 / (f64::from(s.width) * f64::from(s.height)).max(1.0);
+    format!("{per_pixel:.1} {}", s.integrator.parse().map_or("samples", IntegratorKind::sample_name))
 }
 
 fn ago(unix_ms: u64) -> String {
@@ -138,6 +134,22 @@ mod tests {
     }
 
     #[test]
+    fn jobs_of_chains_tell_of_mutations() {
+        let job = |kind: IntegratorKind| JobStatus {
+            width: 10,
+            height: 10,
+            samples: 1640,
+            integrator: kind.name().into(),
+            ..Default::default()
+        };
+        let text = jobs(&[job(IntegratorKind::Path), job(IntegratorKind::Mmlt)]);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].contains("PER PIXEL") && !text.to_lowercase().contains("spp"), "{text}");
+        assert!(lines[1].contains("16.4 samples  ") && lines[2].contains("16.4 samples and mutations  "), "{text}");
+        assert!(state_line(&job(IntegratorKind::Mmlt)).contains("16.4 samples and mutations per pixel"));
+    }
+
+    #[test]
     fn a_waiting_job_says_why() {
         let s = JobStatus {
             state: JobState::Active.into(),
@@ -150,7 +162,7 @@ mod tests {
         };
         assert_eq!(
             state_line(&s),
-            "active, 25 %, 2.5 samples per pixel, 0.00 samples/s on 0 workers: no worker is connected"
+            "active, 25 %, 2.5 samples per pixel, 0.00 per second on 0 workers: no worker is connected"
         );
     }
 }

@@ -2,6 +2,7 @@
 
 use proto::json::state_name;
 use proto::{JobState, JobStatus, WorkerStatus};
+use renderer::integrator::IntegratorKind;
 use std::fmt::Write;
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;margin:2rem;color:#222;background:#fafafa}\
@@ -15,7 +16,7 @@ pub fn render(jobs: &[JobStatus], workers: &[WorkerStatus], query: &str) -> Stri
         "<!doctype html><html lang=en><meta charset=utf-8><meta http-equiv=refresh content=4>\
          <meta name=viewport content=\"width=device-width\"><title>lightfarm</title><style>{STYLE}</style><h1>lightfarm</h1>"
     );
-    page += "<h2>Jobs</h2><table><tr><th>Preview<th>Job<th>State<th>Done<th>Samples/pixel<th>Error<th>Workers<th>Time";
+    page += "<h2>Jobs</h2><table><tr><th>Preview<th>Job<th>State<th>Done<th>Per pixel<th>Error<th>Workers<th>Time";
     jobs.iter().for_each(|j| job(&mut page, j, query));
     if jobs.is_empty() {
         page += "<tr><td colspan=8>none; submit one with <code>lightfarm submit SCENE --coordinator URL</code>";
@@ -34,7 +35,8 @@ fn job(page: &mut String, s: &JobStatus, query: &str) {
     let (id, name, state) = (escape(&s.id), escape(&s.name), state_name(s.state()));
     let shown = s.samples > 0 && !matches!(s.state(), JobState::Failed | JobState::Cancelled);
     let image = if shown { format!("<img src=\"/jobs/{id}/preview.png{link}\" alt=\"\">") } else { String::new() };
-    let spp = s.samples as f64 / (f64::from(s.width) * f64::from(s.height)).max(1.0);
+    let per_pixel = s.samples as f64 / (f64::from(s.width) * f64::from(s.height)).max(1.0);
+    let samples = s.integrator.parse().map_or("samples", IntegratorKind::sample_name);
     let error = s.error.map_or_else(String::new, |e| format!("{e:.4}"));
     let left = s.seconds_left.map_or_else(String::new, |t| format!("<br><small>{t:.0} s left</small>"));
     let message = match s.message.as_str() {
@@ -45,7 +47,7 @@ fn job(page: &mut String, s: &JobStatus, query: &str) {
     let _ = write!(
         page,
         "<tr><td>{image}<td>{name}<br><small>{id}<br>{} x {}, {}, priority {}</small>{message}<td>{state}\
-         <td><progress max=1 value={:.4}></progress> {:.0} %{left}<td class=n>{spp:.1}<td class=n>{error}\
+         <td><progress max=1 value={:.4}></progress> {:.0} %{left}<td class=n>{per_pixel:.1}<br><small>{samples}</small><td class=n>{error}\
          <td class=n>{}<td class=n>{:.0} s",
         s.width,
         s.height,
@@ -96,6 +98,17 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn jobs_of_chains_tell_of_mutations() {
+        let page = |integrator: &str| {
+            let s =
+                JobStatus { samples: 1640, width: 10, height: 10, integrator: integrator.into(), ..Default::default() };
+            render(&[s], &[], "")
+        };
+        assert!(page("path").contains("16.4<br><small>samples</small>"));
+        assert!(page("mmlt").contains("16.4<br><small>samples and mutations</small>"));
+    }
 
     #[test]
     fn names_and_messages_can_not_break_out() {

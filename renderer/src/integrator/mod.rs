@@ -43,6 +43,13 @@ integrators! {
     Mmlt = "mmlt",
 }
 
+impl IntegratorKind {
+    /// What its images count in each pixel: of chains, nearly all are mutations.
+    pub fn sample_name(self) -> &'static str {
+        if self == Self::Mmlt { "samples and mutations" } else { "samples" }
+    }
+}
+
 impl std::str::FromStr for IntegratorKind {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
