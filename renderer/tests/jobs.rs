@@ -5,7 +5,9 @@
 use renderer::film::{Aov, Counters, SplatSums, TileSums};
 use renderer::integrator::IntegratorKind;
 use renderer::integrator::mmlt::{BootstrapSums, ChainStats, Found};
-use renderer::job::{Merger, PassPlan, Planner, RenderOptions, RenderSettings, Sampling, Unit, UnitKind, UnitResult};
+use renderer::job::{
+    Merger, Part, PassPlan, Planner, RenderOptions, RenderSettings, Sampling, Unit, UnitKind, UnitResult,
+};
 use renderer::scene::desc::RenderDefaults;
 use renderer::spectrum::Rgb;
 
@@ -119,6 +121,49 @@ fn every_light_path_is_planned_exactly_once() {
             result
         });
         assert_eq!(upto.iter().sum::<u64>(), u64::from(spp) * u64::from(size.0 * size.1));
+    }
+}
+
+/// Jobs that time or error ends, here capped by a count: on a large film, a pass can't wait for a sample of every group.
+#[test]
+fn passes_of_open_ended_jobs_start_small_and_deal_evenly() {
+    for (_, kind) in IntegratorKind::ALL.iter().copied() {
+        let options = RenderOptions { time_s: Some(1e9), size: Some((640, 400)), ..RenderOptions::counting(kind, 150) };
+        let s = RenderSettings::resolve(&options, &RenderDefaults::default()).unwrap();
+        let (g, mut done, mut passes) = (s.replicates, 0, 0);
+        let mut upto = vec![0u32; g as usize];
+        let mut turns = vec![0u64; g as usize];
+        let mut merger = Merger::new(s.clone());
+        loop {
+            let plan = merger.plan().clone();
+            let limit = if done < 8 * u64::from(g) { (done / 10).max(2) } else { (done / 10).max(u64::from(g)) };
+            assert!(plan.spp() <= limit, "{kind:?}: {} samples per pixel after {done}", plan.spp());
+            let parts: Vec<_> =
+                plan.parts.iter().filter_map(|p| if let Part::Samples(r) = p { Some(*r) } else { None }).collect();
+            for range in &parts {
+                assert_eq!(
+                    range.start, upto[range.replicate as usize],
+                    "{kind:?}: samples of a group follow each other"
+                );
+                assert!(range.end > range.start);
+                upto[range.replicate as usize] = range.end;
+                turns[range.replicate as usize] += plan.spp().div_ceil(u64::from(g));
+            }
+            (done, passes) = (done + plan.spp(), passes + 1);
+            for id in 0..plan.unit_count() {
+                merger.fold(id, &made_up(&plan, &plan.unit(id).unwrap())).unwrap();
+            }
+            if merger.advance(false).is_none() {
+                break;
+            }
+        }
+        assert_eq!(done, 150, "{kind:?}");
+        assert!(passes > 20, "{kind:?}: {passes} passes");
+        let (most, least) = (turns.iter().max().unwrap(), turns.iter().min().unwrap());
+        assert!(most - least <= 1, "{kind:?}: {turns:?}");
+        if kind != IntegratorKind::Mmlt {
+            assert_eq!(upto.iter().sum::<u32>(), 150);
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 use super::metropolis::Metropolis;
-use super::plan::{Learned, Part, PassPlan, Planner, Sampling};
+use super::plan::{CHECKPOINT_SAMPLES, Learned, Part, PassPlan, Planner, Sampling};
 use super::settings::RenderSettings;
 use super::unit::{UnitKind, UnitResult};
 use crate::film::{Aov, Counters, GroupFilm, MergedImage, SplatSums};
@@ -24,8 +24,6 @@ pub enum FoldError {
     Mismatch(u32),
 }
 
-/// Samples per pixel (mutations) of each group before its error is believed.
-const CHECKPOINT_SAMPLES: u32 = 8;
 /// Contributions of a bidirectional connection below this share of the image's mean are left to chance.
 const CONNECTION_SHARE: f64 = 0.02;
 
@@ -103,7 +101,7 @@ impl Merger {
             let pixels = self.settings.width as usize * self.settings.height as usize;
             if self.plan.chain_weight > 0 {
                 let radiance = std::mem::take(&mut self.metropolis.pending);
-                group.add_chains(&radiance, pixels, f64::from(self.plan.chain_weight));
+                group.add_chains(&radiance, pixels, self.plan.group_weight(self.settings.replicates));
                 if part.closes || part.replicate > 0 {
                     self.metropolis.forget_preview();
                 }
@@ -202,8 +200,7 @@ impl Merger {
 
     fn next_plan(&mut self) -> Option<PassPlan> {
         if self.settings.integrator == IntegratorKind::Mmlt {
-            let direct = |i: usize| self.groups[0].pixel(i).0;
-            return self.metropolis.next(&self.settings, &self.plan, self.done_spp, direct);
+            return self.metropolis.next(&self.settings, &self.plan, self.done_spp, &self.groups);
         }
         let learned = Learned { light_weights: self.learned_weights(), threshold: self.learned_threshold() };
         self.planner.next(self.plan.pass + 1, self.done_spp, learned)

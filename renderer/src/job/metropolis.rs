@@ -4,14 +4,14 @@
 //!   and is a preview; its samples count for nothing else, so nothing that it steers is biased by it.
 //! * Pass 1 makes *pools*: independent samples again, now of the target that the chains will have. A pool's mean is `b`.
 //! * Later passes run *chains* from starts drawn from the pools, and the ordinary samples of emission and direct light; where time or
-//!   error is the budget, they also make the pools of the pass after. Every pass is a complete estimate of its own, whose weight is its
-//!   number of mutations, fixed before anything of it is known.
+//!   error is the budget, they also make the pools of the pass after. What a pass does for a group is a complete estimate of its own,
+//!   whose weight is its number of mutations, fixed before anything of it is known. The first passes may leave groups out.
 //!
 //! `b` and the starts of one chain always come from the same pool, which keeps `b` times the mean splat unbiased whatever the length of
 //! the chains. Their *number* may depend on the pools: systematic resampling gives the same expectation for any number of starts.
 
 use super::bytes::Reader;
-use super::plan::{GroupRange, Part, PassPlan, Sampling};
+use super::plan::{GroupRange, Part, PassPlan, Sampling, dealt, pass_size};
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{GroupFilm, SplatSums};
@@ -37,8 +37,8 @@ const THRESHOLD_SHARE: f64 = 0.02;
 const MAX_POOLS: f64 = (1 << 20) as f64;
 /// Edges of the longest path of chains when the depth is unbounded.
 const LONGEST_UNBOUNDED: u32 = 32;
-/// Mutations per pixel of the first pass of chains of a job that time or error ends.
-const FIRST_PASS: u32 = 16;
+/// Mutations per pixel that the pilot of a job is meant for that time or error ends.
+const FIRST_MUTATIONS: u32 = 16;
 
 /// The path lengths that chains carry: beyond emission and direct light.
 pub fn lengths(settings: &RenderSettings) -> std::ops::RangeInclusive<u32> {
@@ -133,7 +133,7 @@ fn fixed_budget(settings: &RenderSettings) -> Option<u32> {
 }
 
 fn first_mutations(settings: &RenderSettings) -> u32 {
-    fixed_budget(settings).unwrap_or(FIRST_PASS).min(settings.budget.mpp.unwrap_or(u32::MAX))
+    fixed_budget(settings).unwrap_or(FIRST_MUTATIONS).min(settings.budget.mpp.unwrap_or(u32::MAX))
 }
 
 fn plan(
@@ -155,6 +155,46 @@ fn plan(
         chains: Some(chains),
         chain_weight,
         last,
+    }
+}
+
+/// What a pass of chains does of the job.
+struct Share {
+    /// Mutations per pixel that were made before, all groups together.
+    done: u32,
+    /// Mutations per pixel of the pass, all groups together.
+    size: u32,
+    /// The groups that take part, all with as many mutations.
+    groups: Vec<u32>,
+    /// Mutations per pixel that the pass would have if all groups took part.
+    density: u32,
+    /// They get no more after it.
+    closes: bool,
+}
+
+impl Share {
+    /// Of the pass of chains after `done` mutations per pixel; `None` when there are enough.
+    fn after(settings: &RenderSettings, done: u32) -> Option<Self> {
+        let all = settings.replicates;
+        if let Some(size) = fixed_budget(settings) {
+            let groups = (0..all).collect();
+            return (done == 0).then_some(Self { done, size, groups, density: size, closes: true });
+        }
+        let left = settings.budget.mpp.unwrap_or(u32::MAX).saturating_sub(done);
+        let size = pass_size(settings, done, left);
+        let takes_part = |r: &u32| dealt(settings, done + size, *r) > dealt(settings, done, *r);
+        let groups = (0..all).filter(takes_part).collect();
+        (size > 0).then_some(Self { done, size, groups, density: size.max(all), closes: false })
+    }
+
+    /// The ordinary samples of a group that go with its mutations.
+    fn direct(&self, settings: &RenderSettings, replicate: u32, film: &GroupFilm) -> GroupRange {
+        let share = f64::from(settings.mmlt.direct_share) / f64::from(settings.replicates);
+        // The film knows how many it has: at least one of every pass, and the pilot's.
+        let start = film.pixel(0).1 as u32;
+        let done = dealt(settings, self.done, replicate) * settings.replicates;
+        let end = (f64::from(done + self.density) * share).ceil() as u32 + 1;
+        GroupRange { replicate, start, end: end.max(start + 1), closes: self.closes }
     }
 }
 
@@ -207,42 +247,32 @@ impl Metropolis {
         Some(())
     }
 
-    /// The pass after `before`, which is complete, at `done` mutations per pixel in all. `direct` is the picture of what ordinary samples
-    /// carry, as far as it is known.
+    /// The pass after `before`, which is complete, at `done` mutations per pixel in all. `groups` are the films so far.
     pub fn next(
         &mut self,
         settings: &RenderSettings,
         before: &PassPlan,
         done: u32,
-        direct: impl Fn(usize) -> [f64; 3],
+        groups: &[GroupFilm],
     ) -> Option<PassPlan> {
         let pass = before.pass + 1;
         // A depth limit may leave nothing to chains.
         let empty = lengths(settings).is_empty();
         if pass == 1 && !empty {
-            let chains = self.learn(settings, direct);
-            let parts = Self::pools_of(settings, first_mutations(settings));
+            // Before there are chains, the first group's film is that of ordinary samples.
+            let chains = self.learn(settings, |i| groups[0].pixel(i).0);
+            let parts = Self::pools_of(settings, &Share::after(settings, 0)?);
             return Some(plan(settings, pass, parts, chains, 0, false));
         }
         let chains = before.chains.clone()?;
-        let (size, last) = match fixed_budget(settings) {
-            Some(_) if done > 0 => return None,
-            Some(mpp) => (mpp, true),
-            None => {
-                let left = settings.budget.mpp.unwrap_or(u32::MAX).saturating_sub(done);
-                let size = (done / 10).max(FIRST_PASS).min(left);
-                (size, size == left)
-            }
-        };
-        if size == 0 {
-            return None;
-        }
-        let mut parts = self.chains_of(settings, pass, size, done, last && fixed_budget(settings).is_some());
+        let share = Share::after(settings, done)?;
+        let mut parts = self.chains_of(settings, pass, &share, groups);
         self.pools.clear();
-        if !last && !empty {
-            parts.extend(Self::pools_of(settings, ((done + size) / 10).max(FIRST_PASS)));
+        let next = Share::after(settings, done + share.size);
+        if let Some(next) = next.as_ref().filter(|_| !empty) {
+            parts.extend(Self::pools_of(settings, next));
         }
-        Some(plan(settings, pass, parts, chains, size, last))
+        Some(plan(settings, pass, parts, chains, share.size, next.is_none()))
     }
 
     /// Technique probabilities and the target map from the pilot.
@@ -296,19 +326,20 @@ impl Metropolis {
         (columns, target)
     }
 
-    /// The pools for a pass of `mpp` mutations per pixel.
-    fn pools_of(settings: &RenderSettings, mpp: u32) -> Vec<Part> {
-        let samples = pool_samples(settings, f64::from(settings.mmlt.pool_share), mpp).min(MAX_POOLS)
+    /// The pools for a pass.
+    fn pools_of(settings: &RenderSettings, share: &Share) -> Vec<Part> {
+        let samples = pool_samples(settings, f64::from(settings.mmlt.pool_share), share.density).min(MAX_POOLS)
             / f64::from(settings.replicates);
         let samples = samples.max(MIN_POOL) as u32;
-        (0..settings.replicates).map(|replicate| Part::Bootstrap { replicate, samples }).collect()
+        share.groups.iter().map(|replicate| Part::Bootstrap { replicate: *replicate, samples }).collect()
     }
 
-    /// The chains of a pass of `mpp` mutations per pixel, and its ordinary samples, group after group.
-    fn chains_of(&self, settings: &RenderSettings, pass: u32, mpp: u32, done: u32, closes: bool) -> Vec<Part> {
+    /// The chains of a pass and its ordinary samples, group after group.
+    fn chains_of(&self, settings: &RenderSettings, pass: u32, of_pass: &Share, films: &[GroupFilm]) -> Vec<Part> {
         let groups = f64::from(settings.replicates);
         let budget =
-            f64::from(mpp) * pixels(settings) * (1.0 - PILOT_SHARE - f64::from(settings.mmlt.pool_share)) / groups;
+            f64::from(of_pass.density) * pixels(settings) * (1.0 - PILOT_SHARE - f64::from(settings.mmlt.pool_share))
+                / groups;
         let lengths: Vec<u32> = lengths(settings).collect();
         // Mutations by what a length contributes, over the root of what one costs; a tenth for all alike.
         let mean_b = |edges: u32| {
@@ -320,7 +351,7 @@ impl Metropolis {
         let length =
             (budget / (8 * lengths.len().max(1)) as f64).clamp(1.0, f64::from(settings.mmlt.chain_length)) as u32;
         let mut parts = Vec::new();
-        for replicate in 0..settings.replicates {
+        for &replicate in &of_pass.groups {
             for (edges, weight) in lengths.iter().zip(&weights) {
                 let Some(pool) = self.pools.get(&(replicate, *edges)) else { continue };
                 let b = pool.b() as f32;
@@ -334,19 +365,9 @@ impl Metropolis {
                 let starts = pool.starts(chains, u);
                 parts.push(Part::Chains { replicate, edges: *edges, b, starts, mutations: length });
             }
-            parts.push(Part::Samples(self.direct_of(settings, replicate, done, mpp, closes)));
+            parts.push(Part::Samples(of_pass.direct(settings, replicate, &films[replicate as usize])));
         }
         parts
-    }
-
-    /// The ordinary samples of a group that go with mutations `done .. done + mpp` per pixel.
-    fn direct_of(&self, settings: &RenderSettings, replicate: u32, done: u32, mpp: u32, closes: bool) -> GroupRange {
-        let share = f64::from(settings.mmlt.direct_share) / f64::from(settings.replicates);
-        let upto = |mpp: u32| (f64::from(mpp) * share).ceil() as u32 + 1;
-        // The pilot took the first sample of group 0.
-        let first = u32::from(replicate == 0);
-        let start = if done == 0 { first } else { upto(done).max(1) };
-        GroupRange { replicate, start, end: upto(done + mpp).max(start + 1), closes }
     }
 
     /// Adds splats of chains, scaled to radiance, to what is pending.

@@ -17,6 +17,31 @@ const UNIT_BOOTSTRAP: u32 = 1 << 12;
 const UNIT_MUTATIONS: u64 = 1 << 18;
 /// Most samples per pixel of a job.
 const MAX_SPP: u32 = 1 << 24;
+/// Samples that the first passes of a job aim at that time or error ends: seconds of work on few cores.
+const PASS_SAMPLES: u64 = 1 << 19;
+/// Samples per pixel (mutations) of each group before its error is believed.
+pub const CHECKPOINT_SAMPLES: u32 = 8;
+
+/// Samples per pixel (mutations) of the pass after `done`, of which `left` are left, in a job that time or error ends.
+///
+/// A tenth of what is done, so that passes stay below a tenth of a time budget, and checkpoints are declared before anything is
+/// measured. On large films the first passes have fewer samples than there are groups, which get theirs in turn (see [`dealt`]): a
+/// sample for each of them could take minutes. Above their number, all groups get the same.
+pub fn pass_size(settings: &RenderSettings, done: u32, left: u32) -> u32 {
+    let g = settings.replicates;
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    // At most the number of groups, which is small.
+    let first = (PASS_SAMPLES / pixels).clamp(1, u64::from(g)) as u32;
+    let least = if done < CHECKPOINT_SAMPLES * g { first } else { g };
+    let size = (done / 10).max(least).min(left);
+    if size > g { size / g * g } else { size }
+}
+
+/// How many of `total` samples per pixel fall to a group.
+pub fn dealt(settings: &RenderSettings, total: u32, group: u32) -> u32 {
+    let g = settings.replicates;
+    total / g + u32::from(group < total % g)
+}
 
 /// The samples of one replicate group in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -126,6 +151,12 @@ impl PassPlan {
             }
         }
         if self.chains.is_some() { u64::from(self.chain_weight) } else { samples }
+    }
+
+    /// Weight of the chains of one of its groups among those of the same group in other passes, in a job of `replicates` groups.
+    pub fn group_weight(&self, replicates: u32) -> f64 {
+        let groups = self.parts.iter().filter(|p| matches!(p, Part::Samples(_))).count().max(1);
+        f64::from(self.chain_weight) * f64::from(replicates) / groups as f64
     }
 
     fn pixels(&self) -> u64 {
@@ -268,7 +299,7 @@ impl Planner {
             return metropolis::pilot(&self.settings);
         }
         let Some(spp) = self.sample_budget() else {
-            return self.pass(0, 0, self.settings.replicates, Learned::default());
+            return self.pass(0, 0, pass_size(&self.settings, 0, MAX_SPP), Learned::default());
         };
         let groups = self.shares(spp);
         let first = if self.learns_first() {
@@ -296,11 +327,8 @@ impl Planner {
             };
             return (pass == 1).then(|| self.plan(pass, rest, learned, true));
         }
-        // A tenth of what is done, in whole samples per group: passes stay below a tenth of a time budget, and checkpoints are
-        // declared before anything is measured.
-        let g = self.settings.replicates;
         let left = self.settings.budget.spp.map_or(MAX_SPP, |n| n.min(MAX_SPP)).saturating_sub(done);
-        let size = (done / 10 / g * g).max(g).min(left);
+        let size = pass_size(&self.settings, done, left);
         (size > 0).then(|| self.pass(pass, done, size, learned))
     }
 
@@ -334,9 +362,8 @@ impl Planner {
 
     /// Samples `from .. from + size` of the job, dealt to the groups as evenly as can be.
     fn pass(&self, pass: u32, from: u32, size: u32, learned: Learned) -> PassPlan {
-        let g = self.settings.replicates;
-        let upto = |total: u32, r: u32| total / g + u32::from(r < total % g);
-        let groups = (0..g)
+        let upto = |total: u32, r: u32| dealt(&self.settings, total, r);
+        let groups = (0..self.settings.replicates)
             .map(|r| GroupRange { replicate: r, start: upto(from, r), end: upto(from + size, r), closes: false })
             .filter(|r| r.end > r.start)
             .collect();
