@@ -305,5 +305,5 @@ impl Farm {
 }
 
 #[cfg(test)]
-#[path = "farm_tests.rs"]
+#[path = "farm_tests/mod.rs"]
 mod tests;
