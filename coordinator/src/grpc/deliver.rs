@@ -8,8 +8,7 @@ use crate::outcome::{Expected, Interest};
 use crate::store::{Appended, NewResult, StoreError, received};
 use bytes::{Bytes, BytesMut};
 use proto::Verdict;
-use renderer::film::{Aov, BLOCK};
-use renderer::job::{Unit, UnitKind, UnitResult};
+use renderer::job::UnitResult;
 use renderer::scene::bundle::Digest;
 use std::sync::Arc;
 use std::time::Duration;
@@ -62,23 +61,6 @@ async fn next(parts: &mut Streaming<proto::OutcomePart>) -> Result<Option<proto:
     timeout(PATIENCE, parts.message()).await.map_err(|_| Status::deadline_exceeded("nothing came for too long"))?
 }
 
-/// The longest encoding of a unit's result: all its numbers, LZ4's worst case, and the head.
-fn longest(unit: &Unit, e: &Expected) -> u64 {
-    let (w, h) = (e.settings.width, e.settings.height);
-    let blocks = u64::from(w.div_ceil(BLOCK)) * u64::from(h.div_ceil(BLOCK));
-    let film = blocks * u64::from(BLOCK * BLOCK * 3 + 1);
-    let floats = match &unit.kind {
-        UnitKind::Tile { rect, .. } => film + rect.area() as u64 * (3 + size_of::<Aov>() as u64 / 4),
-        UnitKind::Paths { .. } | UnitKind::Chains { .. } => film,
-        UnitKind::Bootstrap { start, end } => {
-            let depths = e.plan.chains.iter().flat_map(|c| &c.depths);
-            let (lengths, techniques) = depths.fold((0, 0), |(n, t), d| (n + 1, t + d.techniques.len() as u64 + 1));
-            film + 5 * lengths * u64::from(end - start) + 2 * techniques
-        }
-    };
-    1024 + 8 * u64::from(e.lights) + 4 * floats + 4 * floats / 250
-}
-
 /// An outcome whose data is coming in.
 struct Incoming {
     head: Head,
@@ -98,7 +80,7 @@ impl Incoming {
             Interest::Later => return Err(Status::unavailable("the job is being restored; try again")),
             Interest::Wanted(e) => {
                 let unit = e.plan.unit(incoming.head.at.unit);
-                incoming.too_long = unit.is_none_or(|u| incoming.head.len > longest(&u, e));
+                incoming.too_long = unit.is_none_or(|u| incoming.head.len > UnitResult::longest(&e.plan, &u, e.lights));
             }
             Interest::Stored | Interest::Unwanted => {}
         }

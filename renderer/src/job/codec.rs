@@ -1,6 +1,7 @@
 //! Unit results as bytes: byte planes of f32 sums, LZ4. The identity of a result is the digest of these bytes.
 
 use super::bytes::Reader;
+use super::plan::PassPlan;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Aov, BLOCK, Counters, SplatSums, TileSums};
 use crate::integrator::mmlt::{BootstrapSums, ChainStats, Found};
@@ -11,6 +12,8 @@ const MAGIC: &[u8; 4] = b"LFU2";
 const BLOCK_FLOATS: usize = (BLOCK * BLOCK) as usize * 3;
 /// Edges of the longest path that chains carry, at most.
 const MAX_EDGES: u32 = 255;
+/// Words of a path that a pool found.
+const FOUND_WORDS: u64 = 5;
 const AOV_FLOATS: usize = size_of::<Aov>() / 4;
 
 /// Bytes that are not the result of the unit asked for.
@@ -51,6 +54,22 @@ impl UnitResult {
         head
     }
 
+    /// The most bytes that [`UnitResult::encode`] makes of a result of `unit`: all its numbers, LZ4's worst case, and the head.
+    pub fn longest(plan: &PassPlan, unit: &Unit, lights: u32) -> u64 {
+        let blocks = SplatSums::new(plan.width, plan.height).block_count() as u64;
+        let film = blocks * (BLOCK_FLOATS as u64 + 1);
+        let floats = match &unit.kind {
+            UnitKind::Tile { .. } => film + of_tile(unit) as u64,
+            UnitKind::Paths { .. } | UnitKind::Chains { .. } => film,
+            UnitKind::Bootstrap { start, end } => {
+                let depths = plan.chains.iter().flat_map(|c| &c.depths);
+                let (lengths, sums) = depths.fold((0, 0), |(n, t), d| (n + 1, t + d.techniques.len() as u64 + 1));
+                film + FOUND_WORDS * lengths * u64::from(end - start) + 2 * sums
+            }
+        };
+        1024 + 8 * u64::from(lights) + 4 * floats + 4 * floats / 250
+    }
+
     /// Reads what [`UnitResult::encode`] wrote, for `unit` on a film of `width * height` pixels and a scene of `lights` lights.
     /// Every length is checked against the unit before anything is allocated.
     pub fn decode(bytes: &[u8], unit: &Unit, width: u32, height: u32, lights: usize) -> Result<Self, DecodeError> {
@@ -80,10 +99,7 @@ impl UnitResult {
         }
         let blocks = (0..n).map(|_| r.u32()).collect::<Option<Vec<_>>>().ok_or(fail("too short"))?;
         let count = r.u32().ok_or(fail("too short"))? as usize;
-        let of_tile = match &unit.kind {
-            UnitKind::Tile { rect, .. } => rect.area() * if unit.replicate == 0 { 3 + AOV_FLOATS } else { 3 },
-            UnitKind::Paths { .. } | UnitKind::Bootstrap { .. } | UnitKind::Chains { .. } => 0,
-        };
+        let of_tile = of_tile(unit);
         if count != of_tile + n * BLOCK_FLOATS {
             return Err(fail("the number of sums does not fit the unit"));
         }
@@ -115,6 +131,14 @@ impl UnitResult {
     }
 }
 
+/// Floats of the tile that a unit renders.
+fn of_tile(unit: &Unit) -> usize {
+    match &unit.kind {
+        UnitKind::Tile { rect, .. } => rect.area() * if unit.replicate == 0 { 3 + AOV_FLOATS } else { 3 },
+        UnitKind::Paths { .. } | UnitKind::Bootstrap { .. } | UnitKind::Chains { .. } => 0,
+    }
+}
+
 /// What bootstrap and chain units have beside sums.
 fn encode_chains(result: &UnitResult, out: &mut Vec<u8>) {
     out.push(u8::from(result.splats.is_some()));
@@ -126,7 +150,8 @@ fn encode_chains(result: &UnitResult, out: &mut Vec<u8>) {
         }
         out.extend((b.found.len() as u32).to_le_bytes());
         for f in &b.found {
-            let words = [f.edges, f.index, f.technique, f.weight.to_bits(), f.target.to_bits()];
+            let words: [u32; FOUND_WORDS as usize] =
+                [f.edges, f.index, f.technique, f.weight.to_bits(), f.target.to_bits()];
             words.iter().for_each(|v| out.extend(v.to_le_bytes()));
         }
     }

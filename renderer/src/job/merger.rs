@@ -1,3 +1,4 @@
+use super::bytes::Reader;
 use super::metropolis::Metropolis;
 use super::plan::{CHECKPOINT_SAMPLES, Learned, Part, PassPlan, Planner, Sampling};
 use super::settings::RenderSettings;
@@ -315,26 +316,19 @@ impl Merger {
         if blake3::hash(body).as_bytes() != digest {
             return None;
         }
-        let mut rest = body;
-        let mut take = |n: usize| {
-            let (head, tail) = rest.split_at_checked(n)?;
-            rest = tail;
-            Some(head)
-        };
-        let length = |raw: &[u8]| raw.try_into().ok().map(u64::from_le_bytes).and_then(|n| usize::try_from(n).ok());
-        let head_len = length(take(8)?)?;
-        let head: Head = serde_json::from_slice(take(head_len)?).ok()?;
+        let mut r = Reader(body);
+        let head_len = r.length()?;
+        let head: Head = serde_json::from_slice(r.take(head_len)?).ok()?;
         head.settings.validate().ok()?;
         let pixels = head.settings.width as usize * head.settings.height as usize;
-        let aovs = length(take(8)?)?;
-        let aovs = take(aovs.checked_mul(size_of::<Aov>())?)?;
+        let aovs = r.length()?;
+        let aovs = r.take(aovs.checked_mul(size_of::<Aov>())?)?;
         let aovs: Vec<Aov> = aovs.chunks_exact(size_of::<Aov>()).map(bytemuck::pod_read_unaligned).collect();
         if !aovs.is_empty() && aovs.len() != pixels {
             return None;
         }
-        let groups =
-            (0..head.settings.replicates).map(|_| GroupFilm::load(&mut rest, pixels)).collect::<Option<_>>()?;
-        let metropolis = Metropolis::load(&mut rest, pixels)?;
+        let groups = (0..head.settings.replicates).map(|_| GroupFilm::load(&mut r.0, pixels)).collect::<Option<_>>()?;
+        let metropolis = Metropolis::load(&mut r.0, pixels)?;
         Some(Self {
             planner: Planner::new(head.settings.clone()),
             settings: head.settings,
