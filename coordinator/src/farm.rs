@@ -149,7 +149,8 @@ impl Farm {
         }
         let board = PassBoard::new(plan.unit_count(), done);
         job.progress.folded = 0;
-        job.pass = Some(Pass { plan, document, board, failures: BTreeMap::new(), mismatches: BTreeMap::new() });
+        let (failures, mismatches) = (BTreeMap::new(), BTreeMap::new());
+        job.pass = Some(Pass { plan, document, board, failures, mismatches, pools_are_wrong: false });
         self.wake_all();
     }
 

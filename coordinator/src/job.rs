@@ -114,6 +114,8 @@ pub struct Pass {
     pub failures: BTreeMap<u32, Vec<String>>,
     /// Workers that disagree with the pools that the pass's chains start from.
     pub mismatches: BTreeMap<WorkerId, Disagreement>,
+    /// Workers on two machines disagreed: the job is about to fail.
+    pub pools_are_wrong: bool,
 }
 
 /// A job.

@@ -43,6 +43,9 @@ impl Farm {
         let job = self.jobs.get_mut(&at.job)?;
         let p = job.pass.as_mut().filter(|p| p.plan.pass == at.pass && !p.board.done().contains(at.unit))?;
         p.board.give_back(at.epoch, at.unit, now);
+        if p.pools_are_wrong {
+            return None;
+        }
         let w = self.workers.get_mut(&by)?;
         w.failures += 1;
         self.totals.failures += 1;
@@ -60,7 +63,8 @@ impl Farm {
              {}, {}; {}, {}",
             old.name, new.name, old.name, old.what, new.name, new.what
         );
-        // It was no fault of those who were quarantined for it.
+        // What others report until the job has failed is no fault of theirs, nor was it of those who were quarantined for it.
+        p.pools_are_wrong = true;
         for (id, d) in std::mem::take(&mut p.mismatches) {
             if let Some(w) = self.workers.get_mut(&id) {
                 w.quarantined.take_if(|said| *said == d.quarantine());

@@ -212,4 +212,7 @@ fn who_disagrees_with_a_pool_is_quarantined_unless_two_do() {
         assert!(why.contains(part), "{part} is not in: {why}");
     }
     assert!((0..4).all(|n| quarantined(&world, n).is_none()));
+    // Nor for what they find until the job has failed.
+    assert_eq!(mismatch(&mut world, unit + 3, 0), None);
+    assert!(quarantined(&world, 0).is_none());
 }
