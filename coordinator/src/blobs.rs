@@ -107,7 +107,7 @@ impl Blobs {
         if self.len_of(digest) != Some(bytes.len() as u64) {
             let path = self.path(digest);
             self.make_parent(&path)?;
-            write_durably(&path, bytes)?;
+            write_durably(&path, |f| f.write_all(bytes))?;
         }
         Ok(digest)
     }

@@ -1,7 +1,7 @@
 //! Files that are there completely or not at all, also after a crash.
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io;
 use std::path::Path;
 
 /// Makes a folder's entries durable.
@@ -9,18 +9,19 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
 
-/// Writes beside the file, makes it durable, then takes its place.
-pub fn write_durably(path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// Writes beside the file, makes it durable, then takes its place. Returns what `write` does, which should write in large pieces.
+pub fn write_durably<T>(path: &Path, write: impl FnOnce(&mut File) -> io::Result<T>) -> io::Result<T> {
     let beside = path.with_added_extension("new");
     let written = File::create(&beside).and_then(|mut f| {
-        f.write_all(bytes)?;
-        f.sync_all()
+        let told = write(&mut f)?;
+        f.sync_all()?;
+        Ok(told)
     });
-    if let Err(e) = written {
+    let told = written.inspect_err(|_| {
         let _ = std::fs::remove_file(&beside);
-        return Err(e);
-    }
-    move_durably(&beside, path)
+    })?;
+    move_durably(&beside, path)?;
+    Ok(told)
 }
 
 /// Renames a file whose content is durable.

@@ -179,11 +179,11 @@ impl Merging {
         if self.folded_bytes < bound.max(2 * self.checkpoint.map_or(0, |c| c.1)) {
             return Ok(());
         }
-        let (state, number) = (self.merger.save(), self.checkpoint.map_or(0, |c| c.0 + 1));
-        store.write_checkpoint(self.id, number, &state)?;
+        let number = self.checkpoint.map_or(0, |c| c.0 + 1);
+        let bytes = store.write_checkpoint(self.id, number, |file| self.merger.save(file))?;
         wait(store.change(Change::Checkpoint(self.id, number, self.pass(), self.merger.next_unit())))?;
-        tracing::debug!(job = %self.id, number, bytes = state.len(), "checkpoint");
-        self.checkpoint = Some((number, state.len() as u64));
+        tracing::debug!(job = %self.id, number, bytes, "checkpoint");
+        self.checkpoint = Some((number, bytes));
         self.folded_bytes = 0;
         Ok(())
     }

@@ -12,6 +12,7 @@ use crate::job::{JobSpec, JobState, Progress};
 use bytes::Bytes;
 use renderer::scene::bundle::Digest;
 use std::fs::{File, TryLockError};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
@@ -199,9 +200,14 @@ impl Store {
         files.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum()
     }
 
-    /// Stores the state of a job's merge; it counts with [`Change::Checkpoint`].
-    pub fn write_checkpoint(&self, job: JobId, number: u32, state: &[u8]) -> Result<(), StoreError> {
-        Ok(crate::files::write_durably(&checkpoint_path(&self.folder, job, number), state)?)
+    /// Stores the state of a job's merge, which `save` writes; it counts with [`Change::Checkpoint`]. Returns its length.
+    pub fn write_checkpoint(
+        &self,
+        job: JobId,
+        number: u32,
+        save: impl FnOnce(&mut File) -> io::Result<u64>,
+    ) -> Result<u64, StoreError> {
+        Ok(crate::files::write_durably(&checkpoint_path(&self.folder, job, number), save)?)
     }
 
     /// The state of a job's merge.
@@ -219,7 +225,7 @@ impl Store {
     pub fn write_image(&self, job: JobId, exr: &[u8]) -> Result<(), StoreError> {
         let path = self.image_path(job);
         std::fs::create_dir_all(segment::folder(&self.folder, job))?;
-        crate::files::write_durably(&path, exr)?;
+        crate::files::write_durably(&path, |f| f.write_all(exr))?;
         Ok(())
     }
 }

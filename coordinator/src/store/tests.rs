@@ -158,9 +158,9 @@ fn a_checkpoint_frees_what_is_folded_and_nothing_else() {
     wait(store.append(result(id(1), 1, 0, "next pass"))).unwrap();
     wait(store.append(result(id(1), 1, 3, "further on"))).unwrap();
     let before = store.stored_bytes(id(1));
-    store.write_checkpoint(id(1), 1, b"state").unwrap();
+    assert_eq!(store.write_checkpoint(id(1), 1, |f| f.write_all(b"state").map(|()| 5)).unwrap(), 5);
     wait(store.change(Change::Checkpoint(id(1), 1, 1, 1))).unwrap();
-    store.write_checkpoint(id(1), 2, b"newer").unwrap();
+    store.write_checkpoint(id(1), 2, |f| f.write_all(b"newer").map(|()| 5)).unwrap();
     wait(store.change(Change::Checkpoint(id(1), 2, 1, 1))).unwrap();
     let after = store.stored_bytes(id(1));
     assert!(before > 200 << 20 && after < 81 << 20, "{before} bytes, then {after}");

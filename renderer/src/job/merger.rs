@@ -6,6 +6,7 @@ use super::unit::{UnitKind, UnitResult};
 use crate::film::{Aov, Counters, GroupFilm, MergedImage, SplatSums};
 use crate::integrator::IntegratorKind;
 use crate::integrator::mmlt::ChainStats;
+use std::io::{self, Write};
 
 /// A result that can't be folded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -284,8 +285,9 @@ impl Merger {
         self.chain_stats
     }
 
-    /// The whole state as bytes: a merger that is loaded from them goes on with the same bits.
-    pub fn save(&self) -> Vec<u8> {
+    /// Writes the whole state: a merger that is loaded from these bytes goes on with the same bits. Returns how many they are; at no
+    /// time is more than one film of them in memory.
+    pub fn save(&self, out: &mut impl Write) -> io::Result<u64> {
         let head = Head {
             settings: self.settings.clone(),
             plan: self.plan.clone(),
@@ -299,15 +301,27 @@ impl Merger {
         };
         // A plain struct of numbers always serialises.
         let head = serde_json::to_vec(&head).unwrap_or_default();
-        let mut out = (head.len() as u64).to_le_bytes().to_vec();
-        out.extend(head);
-        out.extend((self.aovs.len() as u64).to_le_bytes());
-        out.extend_from_slice(bytemuck::cast_slice(&self.aovs));
-        self.groups.iter().for_each(|g| g.save(&mut out));
-        self.metropolis.save(&mut out);
-        let digest = blake3::hash(&out);
-        out.extend(digest.as_bytes());
-        out
+        let (mut digest, mut len) = (blake3::Hasher::new(), 0);
+        let mut put = |part: &[u8]| {
+            digest.update(part);
+            len += part.len() as u64;
+            out.write_all(part)
+        };
+        put(&(head.len() as u64).to_le_bytes())?;
+        put(&head)?;
+        put(&(self.aovs.len() as u64).to_le_bytes())?;
+        put(bytemuck::cast_slice(&self.aovs))?;
+        let mut film = Vec::new();
+        for group in &self.groups {
+            film.clear();
+            group.save(&mut film);
+            put(&film)?;
+        }
+        film.clear();
+        self.metropolis.save(&mut film);
+        put(&film)?;
+        out.write_all(digest.finalize().as_bytes())?;
+        Ok(len + blake3::OUT_LEN as u64)
     }
 
     /// Reads what [`Merger::save`] wrote; `None` when the bytes are damaged or of another version.
