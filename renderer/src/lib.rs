@@ -1,7 +1,7 @@
 //! The lightfarm renderer: scene in, units out; the whole of the physics.
 //!
 //! Layers import only downward (`tests/layers.rs` enforces it):
-//! `math, sampling -> spectrum -> geometry, accel -> texture -> bsdf -> light, camera -> scene -> path -> film -> integrator -> job`.
+//! `math, sampling -> spectrum -> geometry, accel -> texture -> bsdf -> medium -> light, camera -> scene -> path -> film -> integrator -> job`.
 //! The crate knows no network and no clock: a unit's result is a pure function of (scene digest, settings, plan, unit).
 
 pub mod accel;
@@ -14,6 +14,7 @@ pub mod integrator;
 pub mod job;
 pub mod light;
 pub mod math;
+pub mod medium;
 pub mod path;
 pub mod sampling;
 pub mod scene;

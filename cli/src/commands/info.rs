@@ -4,7 +4,7 @@ use crate::exit::{Failure, Outcome};
 use crate::output::Console;
 use crate::scene_file;
 use renderer::job::{RenderOptions, RenderSettings};
-use renderer::scene::desc::CameraDesc;
+use renderer::scene::desc::{CameraDesc, Medium, Phase};
 use renderer::scene::{Scene, SceneFeatures, bundle::Digest};
 use renderer::texture::Texture;
 use serde::Serialize;
@@ -35,6 +35,8 @@ struct Info {
     meshes: usize,
     materials: Count,
     lights: Count,
+    media: Count,
+    fills_scene: Option<&'static str>,
     textures: Count,
     texels: u64,
     camera: Camera,
@@ -80,6 +82,8 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         meshes: scene.geometry.meshes.len(),
         materials: count(scene.materials.iter().map(|m| m.kind())),
         lights: count(scene.lights.iter().map(|l| l.kind())),
+        media: count(scene.media.iter().map(medium_kind)),
+        fills_scene: scene.global_medium.map(|id| medium_kind(&scene.media[id.0 as usize])),
         textures: count(scene.textures.iter().map(texture_kind)),
         texels: texels(scene),
         camera: camera(&scene.camera),
@@ -100,6 +104,14 @@ fn texture_kind(t: &Texture) -> &'static str {
     match t {
         Texture::Image { .. } => "Image",
         Texture::Checkerboard { .. } => "Checkerboard",
+    }
+}
+
+fn medium_kind(m: &Medium) -> &'static str {
+    match m.phase {
+        _ if !m.scatters() => "absorbing",
+        Phase::Isotropic => "isotropic",
+        Phase::HenyeyGreenstein { .. } => "Henyey-Greenstein",
     }
 }
 
@@ -162,6 +174,10 @@ impl fmt::Display for Info {
         line("materials", list(&self.materials))?;
         line("textures", format!("{} ({} texels)", list(&self.textures), self.texels))?;
         line("lights", list(&self.lights))?;
+        if features.has_media() {
+            let outside = self.fills_scene.map_or(String::new(), |kind| format!("; {kind} fills the scene"));
+            line("media", format!("{}; {} null surfaces{outside}", list(&self.media), features.null_surfaces))?;
+        }
         let c = &self.camera;
         let lens = if c.aperture_radius > 0.0 {
             format!("lens of radius {} focused at {}", c.aperture_radius, c.focus_distance)

@@ -160,6 +160,7 @@ macro_rules! bsdfs {
                     $(Self::$name { .. } => stringify!($name),)*
                     Self::TwoSided { .. } => "TwoSided",
                     Self::NormalMap { .. } => "NormalMap",
+                    Self::Null => "Null",
                 }
             }
 
@@ -167,7 +168,7 @@ macro_rules! bsdfs {
             fn resolve(&self, at: &At) -> Option<Bsdf> {
                 match *self {
                     $(Self::$name { $($field),* } => Some(Bsdf::$name($name::resolve(at, $($field),*))),)*
-                    Self::TwoSided { .. } | Self::NormalMap { .. } => None,
+                    Self::TwoSided { .. } | Self::NormalMap { .. } | Self::Null => None,
                 }
             }
         }
@@ -284,6 +285,40 @@ bsdfs! {
             /// the normal times the tangent (Mitsuba).
             mirrors_with_uv: bool,
         },
+        /// Nothing at all: light passes straight on. The surface only bounds a medium; rays are not stopped by it, so that
+        /// nothing is ever shaded there.
+        Null,
+    }
+}
+
+impl Material {
+    /// Whether light may come to the inside of a body of this material: it refracts, or is no surface at all. What a thin sheet lets
+    /// through is on its other side, not inside.
+    pub fn admits(&self, materials: &[Self]) -> bool {
+        let mut left = [Some(*self), None];
+        for _ in 0..MAX_NESTING {
+            let inner = |id: MaterialId| materials.get(id.0 as usize).copied();
+            left = match left {
+                [Some(Self::TwoSided { front, back }), None] => [inner(front), inner(back)],
+                [Some(Self::NormalMap { inner: id, .. }), other] => [inner(id), other],
+                [other, Some(Self::NormalMap { inner: id, .. })] => [other, inner(id)],
+                _ => break,
+            };
+        }
+        left.iter().flatten().any(|m| match m {
+            Self::Dielectric { .. } | Self::Null => true,
+            Self::Gltf { transmission, thin, .. } => !thin && *transmission != FloatParam::Const(0.0),
+            _ => false,
+        })
+    }
+
+    /// Whether the surface is not there: null, or untinted glass of the same index as its surroundings.
+    pub fn is_invisible(&self) -> bool {
+        match *self {
+            Self::Null => true,
+            Self::Dielectric { eta, transmittance, .. } => eta == 1.0 && transmittance == RgbParam::Const(Rgb::ONE),
+            _ => false,
+        }
     }
 }
 

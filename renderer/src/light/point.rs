@@ -12,6 +12,11 @@ pub struct PointLight {
 }
 
 impl PointLight {
+    /// Where it is.
+    pub fn position(&self) -> Vec3 {
+        self.position
+    }
+
     /// From position and radiant intensity (W / sr); `None` when black.
     pub fn new(position: DVec3, intensity: Rgb) -> Result<Option<Self>, LightError> {
         let position = position.as_vec3();

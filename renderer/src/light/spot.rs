@@ -26,6 +26,11 @@ pub struct SpotLight {
 }
 
 impl SpotLight {
+    /// Where it is.
+    pub fn position(&self) -> Vec3 {
+        self.position
+    }
+
     /// From a [`LightDesc::Spot`]; `None` when black (or for other lights).
     pub fn new(desc: &LightDesc) -> Result<Option<Self>, LightError> {
         let &LightDesc::Spot { position, direction, intensity, beam, cutoff, falloff } = desc else { return Ok(None) };

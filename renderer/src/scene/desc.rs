@@ -5,6 +5,7 @@ pub use crate::camera::{CameraDesc, FovAxis};
 use crate::geometry::{Mesh, MeshId};
 pub use crate::light::{Emission, LightDesc, SpotFalloff};
 use crate::math::DAffine3;
+pub use crate::medium::{Medium, MediumId, Phase};
 use crate::texture::Texture;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,10 @@ pub struct SceneDesc {
     pub textures: Vec<Texture>,
     /// Shared materials.
     pub materials: Vec<Material>,
+    /// Shared media.
+    pub media: Vec<Medium>,
+    /// The medium wherever no shape's inside is.
+    pub global_medium: Option<MediumId>,
     /// Lights other than emitting shapes.
     pub lights: Vec<LightDesc>,
     /// The one camera that renders.
@@ -57,6 +62,10 @@ pub struct ShapeDesc {
     pub material: MaterialId,
     /// Light it emits, if any.
     pub emission: Option<Emission>,
+    /// What it is filled with; `None` is empty space.
+    pub interior: Option<MediumId>,
+    /// Where insides overlap, the one of the shape with the highest priority is there.
+    pub priority: i32,
 }
 
 /// Pixel reconstruction filter.

@@ -2,6 +2,7 @@ use super::ObjectInfo;
 use crate::bsdf::Material;
 use crate::geometry::{Geometry, Shape};
 use crate::light::Light;
+use crate::medium::{Medium, MediumId};
 use crate::texture::Texture;
 use serde::Serialize;
 
@@ -28,6 +29,12 @@ pub struct SceneFeatures {
     pub textures: usize,
     /// Normal maps among the materials.
     pub normal_maps: usize,
+    /// Participating media that fill something.
+    pub media: usize,
+    /// Shapes whose surface is not there: they only bound a medium.
+    pub null_surfaces: usize,
+    /// Whether a medium scatters the colours at different distances.
+    pub chromatic_media: bool,
     /// Names of what is not there and therefore skipped.
     pub skipped: Vec<&'static str>,
 }
@@ -40,6 +47,7 @@ impl SceneFeatures {
         textures: &[Texture],
         lights: &[Light],
         objects: &[ObjectInfo],
+        media: (&[Medium], Option<MediumId>),
     ) -> Self {
         let mut uses = vec![0u64; geometry.meshes.len()];
         let mut curved = 0;
@@ -62,6 +70,9 @@ impl SceneFeatures {
             infinite_lights: lights.iter().filter(|l| l.flags().infinite).count(),
             textures: textures.len(),
             normal_maps: materials.iter().filter(|m| matches!(m, Material::NormalMap { .. })).count(),
+            media: used_media(media, objects).count(),
+            null_surfaces: objects.iter().filter(|o| o.boundary.is_some_and(|b| b.null)).count(),
+            chromatic_media: used_media(media, objects).any(Medium::is_chromatic),
             skipped: Vec::new(),
         };
         let absent = [
@@ -72,9 +83,26 @@ impl SceneFeatures {
             (f.normal_maps == 0, "normal maps"),
             (f.instances == 0, "transformed instances"),
             (f.curved == 0, "spheres and disks"),
-            (true, "participating media"),
+            (!f.has_media(), "participating media"),
         ];
         f.skipped = absent.iter().filter(|a| a.0).map(|a| a.1).collect();
         f
     }
+
+    /// Whether rays must be followed through media, or through surfaces that are not there.
+    #[inline]
+    pub fn has_media(&self) -> bool {
+        self.media > 0 || self.null_surfaces > 0
+    }
+}
+
+/// The media that are somewhere.
+fn used_media<'a>(
+    (media, global): (&'a [Medium], Option<MediumId>),
+    objects: &'a [ObjectInfo],
+) -> impl Iterator<Item = &'a Medium> {
+    let used = move |id: MediumId| {
+        global == Some(id) || objects.iter().any(|o| o.boundary.is_some_and(|b| b.interior == Some(id)))
+    };
+    media.iter().enumerate().filter(move |(i, _)| used(MediumId(*i as u32))).map(|(_, m)| m)
 }

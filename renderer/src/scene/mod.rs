@@ -2,11 +2,15 @@
 
 pub mod bundle;
 pub mod desc;
+mod enclosures;
 mod features;
+mod flight;
 pub mod import;
 mod shapes;
 
+pub use enclosures::{Boundary, Enclosures};
 pub use features::SceneFeatures;
+pub use flight::{Event, Flight, Target, Transmission};
 
 use crate::accel::Accel;
 use crate::bsdf::{Material, MaterialId, first_bad_nesting};
@@ -14,6 +18,7 @@ use crate::diagnostics::{Diagnostics, SceneError};
 use crate::geometry::{BoundingSphere, Geometry, Interaction, Object};
 use crate::light::{Light, LightContext, LightSelector};
 use crate::math::Transform;
+use crate::medium::Medium;
 use crate::texture::Texture;
 use bundle::FileSource;
 use desc::{SceneDesc, ShapeDesc};
@@ -37,6 +42,12 @@ pub struct Scene {
     pub selector: LightSelector,
     /// What the objects are.
     pub objects: Vec<ObjectInfo>,
+    /// By `MediumId`.
+    pub media: Vec<Medium>,
+    /// The medium wherever no object's inside is.
+    pub global_medium: Option<desc::MediumId>,
+    /// The objects around the camera.
+    pub camera_enclosures: Enclosures,
     /// The camera.
     pub camera: desc::CameraDesc,
     /// What the scene file says of rendering.
@@ -44,6 +55,8 @@ pub struct Scene {
     /// What the scene contains, and so what is skipped.
     pub features: SceneFeatures,
     bounds: BoundingSphere,
+    /// The objects around each light; `None` where they are not the same all over it.
+    light_enclosures: Vec<Option<Enclosures>>,
 }
 
 /// What belongs to an object beside its shape.
@@ -53,6 +66,8 @@ pub struct ObjectInfo {
     pub material: MaterialId,
     /// Index into `Scene::lights` when it emits.
     pub light: Option<u32>,
+    /// What its inside is, where light can come there.
+    pub boundary: Option<Boundary>,
 }
 
 impl Scene {
@@ -67,8 +82,10 @@ impl Scene {
 
     /// Builds the acceleration structure, lights and features of a description; `None` when `diagnostics` got an error.
     pub fn build(desc: SceneDesc, file: &str, diagnostics: &mut Diagnostics) -> Option<Self> {
-        let SceneDesc { meshes, shapes, textures, materials, lights: light_descs, camera, defaults } = desc;
+        let SceneDesc { meshes, shapes, textures, materials, media, global_medium, lights, camera, defaults } = desc;
+        let light_descs = lights;
         check_references(&materials, &meshes, &shapes, file, diagnostics);
+        check_media(&media, global_medium, &materials, &shapes, file, diagnostics);
         if diagnostics.has_errors() {
             return None;
         }
@@ -100,8 +117,9 @@ impl Scene {
                 lights.push(light);
                 lights.len() as u32 - 1
             });
-            info.push(ObjectInfo { material: shape.material, light });
+            info.push(ObjectInfo { material: shape.material, light, boundary: None });
         }
+        enclosures::mark_boundaries(&mut info, &shapes, &materials, &geometry, !media.is_empty());
         for (i, d) in light_descs.iter().enumerate() {
             match Light::from_desc(d) {
                 Ok(light) => lights.extend(light),
@@ -119,8 +137,8 @@ impl Scene {
         let infinite_lights = (0..lights.len() as u32).filter(|i| lights[*i as usize].flags().infinite).collect();
         let context = LightContext { geometry: &geometry, textures: &textures, bounds };
         let powers: Vec<f32> = lights.iter().map(|l| l.power(&context).luminance()).collect();
-        let features = SceneFeatures::find(&geometry, &materials, &textures, &lights, &info);
-        Some(Self {
+        let features = SceneFeatures::find(&geometry, &materials, &textures, &lights, &info, (&media, global_medium));
+        let mut scene = Self {
             accel: accel?,
             selector: LightSelector::new(&powers),
             geometry,
@@ -129,11 +147,19 @@ impl Scene {
             lights,
             infinite_lights,
             objects: info,
+            media,
+            global_medium,
+            camera_enclosures: Enclosures::default(),
             camera,
             defaults,
             features,
             bounds,
-        })
+            light_enclosures: Vec::new(),
+        };
+        if scene.features.has_media() {
+            scene.enclose(file, diagnostics);
+        }
+        Some(scene)
     }
 
     /// Number of lights.
@@ -181,6 +207,40 @@ fn check_references(
         let mesh_missing = matches!(shape.kind, desc::ShapeKind::Mesh(id) if id.0 as usize >= meshes.len());
         if shape.material.0 as usize >= materials.len() || mesh_missing {
             diagnostics.error(file, shape.name.clone(), "the shape names a mesh or material that does not exist", "");
+        }
+    }
+}
+
+/// Checks media and what has one.
+fn check_media(
+    media: &[Medium],
+    global: Option<desc::MediumId>,
+    materials: &[Material],
+    shapes: &[ShapeDesc],
+    file: &str,
+    diagnostics: &mut Diagnostics,
+) {
+    for (i, m) in media.iter().enumerate() {
+        if let Err(e) = Medium::new(m.sigma_t, m.albedo, m.phase) {
+            diagnostics.error(file, format!("medium {i}"), format!("the medium can't be used: {e}"), "");
+        }
+    }
+    let missing = |id: Option<desc::MediumId>| id.is_some_and(|id| id.0 as usize >= media.len());
+    if missing(global) {
+        diagnostics.error(file, "", "the scene names a medium that does not exist", "");
+    }
+    for shape in shapes {
+        if missing(shape.interior) {
+            diagnostics.error(file, shape.name.clone(), "the shape names a medium that does not exist", "");
+        }
+        let flat = matches!(shape.kind, desc::ShapeKind::Disk | desc::ShapeKind::Rectangle);
+        if flat && shape.interior.is_some() {
+            let help = "use a cube, a sphere or a closed mesh";
+            diagnostics.error(file, shape.name.clone(), "a flat shape has no inside that a medium could fill", help);
+        }
+        if shape.emission.is_some() && matches!(materials.get(shape.material.0 as usize), Some(Material::Null)) {
+            let help = "give it another material, or let a shape just inside or outside of it emit";
+            diagnostics.error(file, shape.name.clone(), "a surface that is not there (null) can't emit", help);
         }
     }
 }

@@ -27,6 +27,8 @@ pub fn shape(kind: ShapeKind, to_world: DAffine3, material: u32) -> ShapeDesc {
         flip_normals: false,
         material: MaterialId(material),
         emission: None,
+        interior: None,
+        priority: 0,
     }
 }
 

@@ -9,7 +9,8 @@
 //!   being light, it also lights other surfaces.
 //! * Candela and lux of `KHR_lights_punctual` are taken as W/sr and W/m^2, emissive factor times strength as W/(sr m^2); the `range`
 //!   of a light is ignored.
-//! * A transmitting material is thin unless `KHR_materials_volume` gives it a thickness; then it refracts. Attenuation is ignored.
+//! * A transmitting material is thin unless `KHR_materials_volume` gives it a thickness; then it refracts, and attenuates
+//!   by an absorbing medium inside.
 //! * The camera is the first perspective one of the scene, a pinhole; `aspectRatio` proposes the picture's width at 720 lines.
 //! * Without a camera, one that frames the scene stands in; without light, soft light from all around. Both are said.
 //! * Nodes hidden by `KHR_node_visibility` are left out with all below them.

@@ -3,6 +3,7 @@
 mod gltf;
 pub mod image;
 mod importer;
+mod medium;
 mod mesh_file;
 mod metals;
 mod mitsuba;

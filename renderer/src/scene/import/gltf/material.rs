@@ -6,6 +6,8 @@ use super::document::is_supported;
 use super::report::{Checked, Fault, shorten};
 use super::texture::TextureUse;
 use crate::bsdf::{Material, MaterialId};
+use crate::math::ln64;
+use crate::medium::{MAX_SIGMA, Medium, MediumId, Phase};
 use crate::scene::desc::Emission;
 use crate::scene::import::image::ImageKind;
 use crate::spectrum::Rgb;
@@ -24,6 +26,8 @@ pub(super) struct Surface {
     pub material: MaterialId,
     /// What it emits.
     pub emission: Option<Emission>,
+    /// What fills the body that it bounds.
+    pub interior: Option<MediumId>,
     /// The set of texture coordinates that its textures want; `None` without textures.
     pub uv_set: Option<u32>,
 }
@@ -65,7 +69,7 @@ impl Importer<'_> {
         if extensions.is_some_and(|e| e.unlit.is_some()) {
             let black = Material::Lambert { reflectance: RgbParam::Const(Rgb::ZERO) };
             let emission = Some(Emission { radiance: base_color, two_sided: json.double_sided });
-            return Ok(Surface { material: self.add_material(black)?, emission, uv_set: m.uv_set });
+            return Ok(Surface { material: self.add_material(black)?, emission, interior: None, uv_set: m.uv_set });
         }
         let metallic = self.number(pbr.metallic_factor.0, 0.0, 1.0, 1.0, &format!("{pbr_place}.metallicFactor"));
         let roughness = self.number(pbr.roughness_factor.0, 0.0, 1.0, 1.0, &format!("{pbr_place}.roughnessFactor"));
@@ -82,7 +86,9 @@ impl Importer<'_> {
         let inner = self.add_material(gltf)?;
         let material = self.normal_map(&mut m, inner)?;
         let emission = self.emission(&mut m);
-        Ok(Surface { material, emission, uv_set: m.uv_set })
+        let opaque = thin || transmission == FloatParam::Const(0.0);
+        let interior = if opaque { None } else { self.attenuation(&m) };
+        Ok(Surface { material, emission, interior, uv_set: m.uv_set })
     }
 
     fn add_material(&mut self, material: Material) -> Checked<MaterialId> {
@@ -104,12 +110,6 @@ impl Importer<'_> {
             if !is_supported(extension) {
                 self.report.sum(format!("{} is not supported and is ignored", shorten(extension)), "", &name);
             }
-        }
-        let tinted = |v: &json::extensions::material::Volume| {
-            v.attenuation_distance.0.is_finite() && v.attenuation_color.0 != [1.0; 3]
-        };
-        if extensions.volume.as_ref().is_some_and(tinted) {
-            self.report.sum("the attenuation of KHR_materials_volume is not supported and is ignored", "", &name);
         }
     }
 
@@ -170,6 +170,28 @@ impl Importer<'_> {
         let factor = self.number(t.transmission_factor.0, 0.0, 1.0, 0.0, &format!("{place}.transmissionFactor"));
         let texture = self.raw(m, t.transmission_texture.as_ref(), &format!("{place}.transmissionTexture"));
         (texture.map_or(FloatParam::Const(factor), |id| FloatParam::Texture(id, 0, factor)), thin)
+    }
+
+    /// KHR_materials_volume: white light becomes `attenuationColor` over `attenuationDistance`, by absorption alone.
+    fn attenuation(&mut self, m: &Reading<'_>) -> Option<MediumId> {
+        let volume = m.json.extensions.as_ref()?.volume.as_ref()?;
+        let place = format!("{}.extensions.KHR_materials_volume", m.place);
+        let distance = volume.attenuation_distance.0;
+        if !(distance > 0.0) {
+            let message = format!("{distance} is out of range; expected a number above 0, there is no attenuation");
+            self.report.warn(Fault::new(format!("{place}.attenuationDistance"), message));
+            return None;
+        }
+        let at = format!("{place}.attenuationColor");
+        let colour = volume.attenuation_color.0.map(|v| self.number(v, 0.0, 1.0, 1.0, &at));
+        // Black would be reached nowhere: it is taken for the least that can be told from it.
+        let sigma = |c: f32| (-ln64(f64::from(c.max(f32::MIN_POSITIVE))) / f64::from(distance)) as f32;
+        let sigma_t = Rgb::from(colour.map(|c| sigma(c).clamp(0.0, MAX_SIGMA)));
+        if sigma_t.is_black() {
+            return None;
+        }
+        self.scene.media.push(Medium { sigma_t, albedo: Rgb::ZERO, phase: Phase::Isotropic });
+        Some(MediumId(self.scene.media.len() as u32 - 1))
     }
 
     fn ior(&mut self, m: &Reading<'_>) -> f32 {

@@ -117,6 +117,8 @@ impl Importer<'_> {
                 flip_normals: false,
                 material: surface.material,
                 emission: surface.emission,
+                interior: surface.interior,
+                priority: 0,
             };
             for (k, to_world) in places.iter().enumerate() {
                 let name = if instancing.is_some() { format!("{name}#{k}") } else { name.clone() };

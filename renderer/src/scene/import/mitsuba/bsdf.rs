@@ -11,8 +11,8 @@ use crate::spectrum::Rgb;
 use crate::texture::FloatParam;
 
 /// The BSDFs that can be rendered.
-const BSDFS: [&str; 7] =
-    ["diffuse", "twosided", "conductor", "roughconductor", "dielectric", "roughdielectric", "normalmap"];
+const BSDFS: [&str; 8] =
+    ["diffuse", "twosided", "conductor", "roughconductor", "dielectric", "roughdielectric", "normalmap", "null"];
 /// Parameters that change nothing here.
 const HARMLESS: [&str; 2] = ["sample_visible", "nonlinear"];
 /// Mitsuba's smallest roughness.
@@ -55,6 +55,7 @@ impl Builder<'_, '_, '_> {
             "roughconductor" => Some(self.conductor(&mut reader, true)),
             "dielectric" => Some(self.dielectric(&mut reader, false)),
             "roughdielectric" => Some(self.dielectric(&mut reader, true)),
+            "null" => Some(Material::Null),
             _ => self.normal_map(&mut reader),
         };
         reader.finish(self.importer, self.document, &HARMLESS);
@@ -100,7 +101,7 @@ impl Builder<'_, '_, '_> {
 
     fn transmits(&self, material: MaterialId) -> bool {
         match self.importer.scene.materials[material.0 as usize] {
-            Material::Dielectric { .. } => true,
+            Material::Dielectric { .. } | Material::Null => true,
             Material::NormalMap { inner, .. } => self.transmits(inner),
             _ => false,
         }
@@ -176,8 +177,13 @@ impl Builder<'_, '_, '_> {
         };
         let texture = self.texture(texture, false);
         let inner = *self.nested(reader, 1)?.first()?;
-        if let Material::NormalMap { .. } = self.importer.scene.materials[inner.0 as usize] {
-            self.importer.error(reader.node.at, "a normal map inside a normal map is not supported", "");
+        let wrong = match self.importer.scene.materials[inner.0 as usize] {
+            Material::NormalMap { .. } => Some("a normal map inside a normal map is not supported"),
+            Material::Null => Some("a surface that is not there (null) has no normals to bend"),
+            _ => None,
+        };
+        if let Some(message) = wrong {
+            self.importer.error(reader.node.at, message, "");
             return None;
         }
         Some(Material::NormalMap { inner, texture: texture?, scale: 1.0, mirrors_with_uv: false })

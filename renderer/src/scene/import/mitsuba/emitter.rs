@@ -38,6 +38,7 @@ impl Builder<'_, '_, '_> {
                 return;
             }
         };
+        self.place_in_medium(&mut reader);
         reader.finish(self.importer, self.document, &HARMLESS);
         self.importer.scene.lights.extend(light);
     }

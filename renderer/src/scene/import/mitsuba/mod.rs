@@ -9,6 +9,7 @@ mod emitter;
 mod guard;
 mod integrator;
 mod ior;
+mod medium;
 mod parameters;
 mod reader;
 mod sensor;
@@ -24,6 +25,7 @@ mod tests;
 use super::importer::{Importer, Place};
 use crate::bsdf::MaterialId;
 use crate::diagnostics::nearest;
+use crate::medium::MediumId;
 use crate::texture::TextureId;
 use document::{Document, NodeId};
 use reader::Reader;
@@ -40,6 +42,8 @@ pub(super) fn import(importer: &mut Importer, root: &str) {
         document: &document,
         textures: BTreeMap::new(),
         materials: BTreeMap::new(),
+        media: BTreeMap::new(),
+        exteriors: Vec::new(),
         open: Vec::new(),
         defaults: [None; 2],
         groups: BTreeMap::new(),
@@ -55,6 +59,9 @@ struct Builder<'d, 'i, 'a> {
     /// By object and whether only its luminance is wanted.
     textures: BTreeMap<(NodeId, bool), Option<TextureId>>,
     materials: BTreeMap<NodeId, Option<MaterialId>>,
+    media: BTreeMap<NodeId, Option<MediumId>>,
+    /// What is said to be outside of shapes, or around sensors and emitters.
+    exteriors: Vec<(Place, MediumId)>,
     /// Materials being built, outermost first.
     open: Vec<NodeId>,
     /// The materials of shapes without one: that of an emitter, that of others.
@@ -93,7 +100,11 @@ impl<'d> Builder<'d, '_, '_> {
         for (_, id) in reader.children(document, "shape") {
             self.shape(id);
         }
-        for tag in ["medium", "phase", "volume", "subsurface"] {
+        for (_, id) in reader.children(document, "medium") {
+            self.medium(id);
+        }
+        self.outside();
+        for tag in ["phase", "volume", "subsurface"] {
             for (child, id) in reader.children(document, tag) {
                 self.unsupported(child.at, id, &[]);
             }

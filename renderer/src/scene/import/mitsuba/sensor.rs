@@ -79,10 +79,8 @@ impl Builder<'_, '_, '_> {
         self.importer.scene.camera = camera;
         self.film(&mut reader);
         self.sampler(&mut reader);
-        for (child, id) in reader.children(self.document, "medium") {
-            self.unsupported(child.at, id, &[]);
-        }
-        let harmless = ["near_clip", "far_clip", "shutter_open", "shutter_close", "focus_distance", "medium"];
+        self.place_in_medium(&mut reader);
+        let harmless = ["near_clip", "far_clip", "shutter_open", "shutter_close", "focus_distance"];
         reader.finish(self.importer, self.document, &harmless);
     }
 

@@ -2,6 +2,7 @@
 
 use super::Builder;
 use super::document::NodeId;
+use super::medium::Sides;
 use super::reader::Reader;
 use crate::math::DAffine3;
 use crate::scene::desc::{ShapeDesc, ShapeKind};
@@ -54,10 +55,19 @@ impl Builder<'_, '_, '_> {
             plugin => self.mesh(&mut reader, plugin == "obj", to_world, &mut flip_normals),
         };
         let emission = self.emission(&mut reader);
-        let material = self.shape_material(&mut reader, emission.is_some());
-        self.media(&mut reader);
+        let Sides { interior, any } = self.sides(&mut reader);
+        let material = self.shape_material(&mut reader, emission.is_some(), any);
         reader.finish(self.importer, self.document, &HARMLESS);
-        Some(ShapeDesc { name, kind: kind?, to_world, flip_normals, material: material?, emission })
+        Some(ShapeDesc {
+            name,
+            kind: kind?,
+            to_world,
+            flip_normals,
+            material: material?,
+            emission,
+            interior,
+            priority: 0,
+        })
     }
 
     /// The id, or the kind and a count.
@@ -71,22 +81,23 @@ impl Builder<'_, '_, '_> {
         format!("{} {count}", node.plugin)
     }
 
-    fn shape_material(&mut self, reader: &mut Reader, emits: bool) -> Option<crate::bsdf::MaterialId> {
+    fn shape_material(
+        &mut self,
+        reader: &mut Reader,
+        emits: bool,
+        bounds_medium: bool,
+    ) -> Option<crate::bsdf::MaterialId> {
         let materials = reader.children(self.document, "bsdf");
         if let Some((child, _)) = materials.get(1) {
             self.importer.error(child.at, "a shape can have one BSDF only", "");
         }
         match materials.first() {
             Some((_, id)) => self.material(*id),
-            None => Some(self.default_material(emits)),
-        }
-    }
-
-    fn media(&mut self, reader: &mut Reader) {
-        for tag in ["medium", "subsurface"] {
-            for (child, id) in reader.children(self.document, tag) {
-                self.unsupported(child.at, id, &[]);
+            // Version 0.6 takes a shape between two media for a border of equal indices, unless it says otherwise.
+            None if bounds_medium && !emits && reader.node.legacy => {
+                Some(self.importer.add_material(crate::bsdf::Material::Null))
             }
+            None => Some(self.default_material(emits)),
         }
     }
 

@@ -19,15 +19,17 @@ enum Kind {
     Gltf,
     TwoSided,
     NormalMap,
+    Null,
 }
 
-const KINDS: [(&str, Kind); 6] = [
+const KINDS: [(&str, Kind); 7] = [
     ("diffuse", Kind::Diffuse),
     ("conductor", Kind::Conductor),
     ("dielectric", Kind::Dielectric),
     ("gltf", Kind::Gltf),
     ("two-sided", Kind::TwoSided),
     ("normal-map", Kind::NormalMap),
+    ("null", Kind::Null),
 ];
 /// Smallest and largest microfacet slope.
 const ALPHA: Bound = Bound::Between(1e-4, 4.0);
@@ -89,6 +91,7 @@ impl<'t> Builder<'t, '_, '_> {
             Kind::Gltf => Some(self.metallic_roughness(&mut table)),
             Kind::TwoSided => self.two_sided(&mut table),
             Kind::NormalMap => self.normal_map(&mut table),
+            Kind::Null => Some(Material::Null),
         };
         let one_sided = matches!(kind, Kind::Diffuse | Kind::Conductor);
         let both_sides = one_sided && table.boolean(self.importer, "two_sided", false);
@@ -174,7 +177,12 @@ impl<'t> Builder<'t, '_, '_> {
     fn inner(&mut self, table: &mut Table<'t>, key: &'static str) -> Option<MaterialId> {
         let item = table.require(self.importer, key, "the name of a material")?;
         let name = item.string(self.importer, key)?;
-        self.material(item.at, name)
+        let id = self.material(item.at, name)?;
+        if self.importer.scene.materials[id.0 as usize] == Material::Null {
+            self.importer.error(item.at, "a surface that is not there (null) can't be part of another material", "");
+            return None;
+        }
+        Some(id)
     }
 
     /// The material of shapes that name none: two-sided grey.

@@ -2,6 +2,7 @@
 
 mod light;
 mod material;
+mod medium;
 mod mesh;
 mod shape;
 mod table;
@@ -17,6 +18,7 @@ use super::importer::{Importer, Place};
 use crate::bsdf::MaterialId;
 use crate::diagnostics::Diagnostics;
 use crate::geometry::MeshId;
+use crate::medium::MediumId;
 use crate::texture::TextureId;
 use material::Entry;
 use std::collections::BTreeMap;
@@ -56,6 +58,7 @@ pub(super) fn import(importer: &mut Importer, root: &str) {
         textures: BTreeMap::new(),
         materials: known.collect(),
         meshes: BTreeMap::new(),
+        media: BTreeMap::new(),
         grey: None,
     };
     builder.scene(root, &part);
@@ -95,6 +98,7 @@ struct Builder<'t, 'i, 'a> {
     textures: BTreeMap<&'t str, Option<TextureId>>,
     materials: BTreeMap<&'t str, Entry<'t>>,
     meshes: BTreeMap<&'t str, Option<MeshId>>,
+    media: BTreeMap<&'t str, Option<MediumId>>,
     /// The material of shapes that name none.
     grey: Option<MaterialId>,
 }
@@ -118,6 +122,12 @@ impl<'t> Builder<'t, '_, '_> {
         }
         if let Some(table) = root.table(self.importer, "meshes") {
             self.meshes(&table);
+        }
+        if let Some(table) = root.table(self.importer, "media") {
+            self.media(&table);
+        }
+        if let Some(item) = root.get("medium") {
+            self.importer.scene.global_medium = self.medium("medium", item);
         }
         if let Some(item) = root.get("shapes") {
             self.shapes(item);

@@ -65,10 +65,13 @@ impl<'t> Builder<'t, '_, '_> {
         let two_sided = table.boolean(self.importer, "emission_two_sided", false);
         let emission = table.has("emission").then_some(Emission { radiance, two_sided });
         let flip_normals = table.boolean(self.importer, "flip_normals", false);
+        let interior = table.get("interior").and_then(|item| self.medium("interior", item));
+        let priority = table.integer(self.importer, "priority", i64::from(i32::MIN), i64::from(i32::MAX)).unwrap_or(0);
         let places = self.instances(&mut table);
         table.finish(self.importer);
         if let (Some(kind), Some(material)) = (kind, material) {
-            let shape = ShapeDesc { name, kind, to_world, flip_normals, material, emission };
+            let priority = priority as i32;
+            let shape = ShapeDesc { name, kind, to_world, flip_normals, material, emission, interior, priority };
             self.place(at, &shape, places.as_deref());
         }
     }

@@ -1,5 +1,6 @@
 use super::*;
 use crate::bsdf::{Material, MaterialId};
+use crate::medium::MediumId;
 use crate::scene::desc::Emission;
 use crate::spectrum::Rgb;
 use crate::texture::{Filter, FloatParam, RgbParam, Texture, TextureId, Wrap};
@@ -86,11 +87,24 @@ fn thin_and_refracting_transmission() {
         json!({ "thicknessFactor": 0.0, "attenuationDistance": 2.0, "attenuationColor": [1, 0, 0] });
     let (scene, warnings) = material(volume.clone());
     assert!(thin(&scene));
-    assert!(says(&warnings, &["materials[0]", "attenuation"]), "{warnings:?}");
+    assert!(scene.media.is_empty() && !says(&warnings, &["ttenuation"]), "a thin sheet has no inside: {warnings:?}");
+    volume["KHR_materials_volume"]["thicknessFactor"] = json!(2.0);
+    let (scene, warnings) = material(volume.clone());
+    assert!(!thin(&scene) && !says(&warnings, &["ttenuation"]), "{warnings:?}");
+    // Black would be reached nowhere; what comes nearest to it is as good as opaque over the distance.
+    let [medium] = scene.media[..] else { panic!("{:?}", scene.media) };
+    assert_eq!(scene.shapes[0].interior, Some(MediumId(0)));
+    assert!(medium.sigma_t.r == 0.0 && (40.0..50.0).contains(&medium.sigma_t.g) && !medium.scatters(), "{medium:?}");
+    volume["KHR_materials_volume"]["attenuationColor"] = json!([1.0, 0.5, 0.25]);
+    let medium = material(volume.clone()).0.media[0];
+    let expected = Rgb::new(0.0, 0.5 * std::f32::consts::LN_2, std::f32::consts::LN_2);
+    assert!((medium.sigma_t - expected).map(f32::abs).max_component() < 1e-7, "{medium:?}");
+    volume["KHR_materials_volume"]["attenuationDistance"] = json!(-1.0);
+    let (scene, warnings) = material(volume.clone());
+    assert!(scene.media.is_empty() && says(&warnings, &["attenuationDistance", "-1", "above 0"]), "{warnings:?}");
     volume["KHR_materials_volume"] = json!({ "thicknessFactor": 2.0 });
-    let (scene, warnings) = material(volume);
-    assert!(!thin(&scene));
-    assert!(!says(&warnings, &["attenuation"]));
+    let (scene, _) = material(volume);
+    assert!(!thin(&scene) && scene.media.is_empty());
 }
 
 #[test]

@@ -17,15 +17,15 @@ fn fault(content: &str, line: usize, parts: &[&str]) {
 fn every_unsupported_place_is_listed_at_once() {
     let errors = faults(
         "<bsdf type='principled' id='p'/>\n<bsdf type='twosided'><bsdf type='roughplastic'/></bsdf>\n<shape type='cylinder'/>
-         <emitter type='sunsky'/>\n<medium type='homogeneous'/><bsdf type='difuse'/>",
+         <emitter type='sunsky'/>\n<medium type='heterogeneous'/><bsdf type='difuse'/>",
     );
     let expected = [
         ("line 2, column 1", "the bsdf `principled` is not supported"),
         ("line 3, column 23", "the bsdf `roughplastic` is not supported"),
         ("line 4, column 1", "the shape `cylinder` is not supported"),
         ("line 5, column 10", "the emitter `sunsky` is not supported"),
-        ("line 6, column 1", "the medium `homogeneous` is not supported"),
-        ("line 6, column 29", "did you mean `diffuse`?"),
+        ("line 6, column 1", "the medium `heterogeneous` is not supported"),
+        ("line 6, column 31", "did you mean `diffuse`?"),
     ];
     assert_eq!(errors.len(), expected.len(), "{errors:#?}");
     for (error, (place, part)) in errors.iter().zip(expected) {

@@ -2,6 +2,7 @@
 
 mod faults;
 mod materials;
+mod media;
 mod shapes;
 mod shared;
 mod view;

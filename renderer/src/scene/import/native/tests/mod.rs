@@ -2,6 +2,7 @@
 
 mod faults;
 mod features;
+mod media;
 mod shipped;
 
 /// A complete scene around `content`.

@@ -1,0 +1,8 @@
+//! Participating media against closed forms, quadrature and tables.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
+
+#[path = "../common/mod.rs"]
+mod common;
+mod flight;
+mod scenes;
