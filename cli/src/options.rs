@@ -21,7 +21,7 @@ pub struct RenderArgs {
     /// Mutations per pixel (mmlt)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub mpp: Option<u32>,
-    /// How mmlt runs its chains, for experiments: `plain` = as published, or KEY=VALUE,...
+    /// How mmlt runs its chains, for experiments: `plain` or `pbrt` = as published, or KEY=VALUE,...
     #[arg(long, value_name = "OPTIONS")]
     pub mmlt: Option<MmltOptions>,
     /// Wall time, such as 60s, 5m or 1h30m; ends with the pass in which it runs out

@@ -35,7 +35,7 @@ pub const PRESETS: &[Preset] = &[
         reference: Some("../shared/data/scenes/veach-ajar/mitsuba-3.9-320x180.exr"),
         size: None,
         max_depth: 13,
-        variants: &["mmlt:mpp=64", "bdpt:spp=32", "mmlt:plain,mpp=64", "path:spp=64"],
+        variants: &["mmlt:mpp=64", "bdpt:spp=32", "mmlt:plain,mpp=64", "mmlt:pbrt,mpp=64", "path:spp=64"],
     },
     Preset {
         name: "cornell-box",

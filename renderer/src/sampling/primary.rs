@@ -32,7 +32,7 @@ pub enum Stream {
     Light,
 }
 
-/// A step size table: log-uniform between the two sizes of Kelemen et al., `s2 exp(-ln(s2 / s1) u)`.
+/// A table of the sizes of small steps, equally likely.
 #[derive(Clone, Debug)]
 pub struct StepSizes {
     sizes: Vec<f32>,
@@ -41,10 +41,28 @@ pub struct StepSizes {
 impl StepSizes {
     const CELLS: usize = 1024;
 
-    /// Between `smallest` and `largest`, parts of the unit interval.
-    pub fn new(smallest: f64, largest: f64) -> Self {
+    /// Log-uniform between `smallest` and `largest`, parts of the unit interval: `s2 exp(-ln(s2 / s1) u)` of Kelemen et al.
+    pub fn log_uniform(smallest: f64, largest: f64) -> Self {
         let size = |i: usize| largest * crate::math::pow64(smallest / largest, (i as f64 + 0.5) / Self::CELLS as f64);
         Self { sizes: (0..Self::CELLS).map(|i| size(i) as f32).collect() }
+    }
+
+    /// Normally distributed, with standard deviation `sigma` (Pharr, Jakob and Humphreys 2016, section 16.4).
+    pub fn gaussian(sigma: f64) -> Self {
+        // The size that a share `p` of all steps does not exceed, by bisection.
+        let size = |p: f64| {
+            let (mut low, mut high) = (0.0, 8.0);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if crate::math::erf64(middle * std::f64::consts::FRAC_1_SQRT_2) < p {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            sigma * low
+        };
+        Self { sizes: (0..Self::CELLS).map(|i| size((i as f64 + 0.5) / Self::CELLS as f64) as f32).collect() }
     }
 
     /// A signed step from 32 random bits.
@@ -230,5 +248,27 @@ impl Sampler for PrimaryStream<'_> {
             0 => self.start,
             v => self.walk + STRIDE * (v as usize - 1),
         };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn step_sizes_have_their_distributions() {
+        let gaussian = StepSizes::gaussian(0.01).sizes;
+        let n = gaussian.len() as f64;
+        let variance = gaussian.iter().map(|s| f64::from(*s) * f64::from(*s)).sum::<f64>() / n;
+        // Midpoints of equal shares lose a little of the tails.
+        assert!((variance / 1e-4 - 1.0).abs() < 5e-3, "{variance}");
+        // Half of all steps are smaller than the probable error.
+        let median = f64::from(gaussian[511] + gaussian[512]) / 2.0;
+        assert!((median / 0.006_744_897_5 - 1.0).abs() < 1e-4, "{median}");
+        let (small, large) = (1.0 / 1024.0, 1.0 / 64.0);
+        let sizes = StepSizes::log_uniform(small, large).sizes;
+        let mean = sizes.iter().map(|s| libm::log(f64::from(*s))).sum::<f64>() / n;
+        assert!((mean - libm::log(small * large) / 2.0).abs() < 1e-6, "{mean}");
+        assert!(sizes.iter().all(|s| (small..=large).contains(&f64::from(*s))));
     }
 }

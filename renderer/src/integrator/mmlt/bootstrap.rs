@@ -104,7 +104,7 @@ impl<'a, 'b> Pool<'a, 'b> {
             c,
             constants,
             tracer: c.tracer(None),
-            sizes: StepSizes::new(f64::from(options.step_min), f64::from(options.step_max)),
+            sizes: options.step_sizes(),
             tables: constants.depths.iter().map(|d| d.table(c.scene)).collect(),
             size: Vec2::new(c.view.width as f32, c.view.height as f32),
             space: PrimarySpace::new(longest),

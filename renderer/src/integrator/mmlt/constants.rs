@@ -1,5 +1,5 @@
 use crate::math::Vec2;
-use crate::sampling::Discrete;
+use crate::sampling::{Discrete, StepSizes};
 use crate::scene::Scene;
 use crate::spectrum::Rgb;
 use serde::{Deserialize, Serialize};
@@ -17,6 +17,8 @@ pub struct MmltOptions {
     pub step_min: f32,
     /// Largest small step.
     pub step_max: f32,
+    /// Standard deviation of normally distributed small steps in place of those; 0 = none.
+    pub gaussian: f32,
     /// Combine large steps with the chain by the balance heuristic.
     pub kelemen: bool,
     /// Exponent by which dark regions are lifted: 0 = luminance alone, 1 = the same relative error everywhere.
@@ -41,6 +43,7 @@ impl Default for MmltOptions {
             large_step: 0.1,
             step_min: 1.0 / 1024.0,
             step_max: 1.0 / 64.0,
+            gaussian: 0.0,
             kelemen: true,
             lift: 0.5,
             learn: true,
@@ -54,12 +57,13 @@ impl Default for MmltOptions {
 }
 
 impl MmltOptions {
-    /// The method as published: no weights for large steps, luminance as the target, techniques alike, few long chains, all light by
-    /// chains.
+    /// The method as published, with the steps of Kelemen et al.: no weights for large steps, luminance as the target, techniques alike,
+    /// few long chains, all light by chains.
     pub const PLAIN: Self = Self {
         large_step: 0.3,
         step_min: 1.0 / 1024.0,
         step_max: 1.0 / 64.0,
+        gaussian: 0.0,
         kelemen: false,
         lift: 0.0,
         learn: false,
@@ -70,6 +74,18 @@ impl MmltOptions {
         longest: 64,
     };
 
+    /// The same with the steps of Pharr, Jakob and Humphreys (2016, section 16.4).
+    pub const PBRT: Self = Self { gaussian: 0.01, ..Self::PLAIN };
+
+    /// Sizes of small steps.
+    pub fn step_sizes(&self) -> StepSizes {
+        if self.gaussian > 0.0 {
+            StepSizes::gaussian(f64::from(self.gaussian))
+        } else {
+            StepSizes::log_uniform(f64::from(self.step_min), f64::from(self.step_max))
+        }
+    }
+
     /// Checks what came from a user or over the wire.
     pub fn validate(&self) -> Result<(), String> {
         let fail = |what: &str| Err(format!("mmlt: {what}"));
@@ -78,6 +94,9 @@ impl MmltOptions {
         }
         if !(self.step_min > 0.0 && self.step_min <= self.step_max && self.step_max <= 0.5) {
             return fail("steps must fulfil 0 < step_min <= step_max <= 0.5");
+        }
+        if !(0.0..=0.25).contains(&self.gaussian) {
+            return fail("gaussian must lie between 0 and 0.25");
         }
         if !(0.0..=1.0).contains(&self.lift) {
             return fail("lift must lie between 0 and 1");
@@ -101,18 +120,18 @@ impl MmltOptions {
 impl std::str::FromStr for MmltOptions {
     type Err = String;
 
-    /// `plain`, or `key=value` pairs, separated by commas; later ones win.
+    /// `plain`, `pbrt`, or `key=value` pairs, separated by commas; later ones win.
     fn from_str(text: &str) -> Result<Self, String> {
         // A plain struct of numbers always serialises.
         let object = |o: Self| serde_json::to_value(o).map_err(|e| e.to_string());
         let mut value = object(Self::default())?;
         for item in text.split(',').filter(|item| !item.is_empty()) {
-            if item == "plain" {
-                value = object(Self::PLAIN)?;
+            if let Some((_, preset)) = [("plain", Self::PLAIN), ("pbrt", Self::PBRT)].iter().find(|(n, _)| *n == item) {
+                value = object(*preset)?;
                 continue;
             }
             let (key, number) =
-                item.split_once('=').ok_or_else(|| format!("{item:?} is neither `plain` nor key=value"))?;
+                item.split_once('=').ok_or_else(|| format!("{item:?} is not `plain`, `pbrt` or key=value"))?;
             let Some(slot) = value.get_mut(key) else {
                 let known = value.as_object().map(|o| o.keys().cloned().collect::<Vec<_>>().join(", "));
                 return Err(format!("there is no option {key:?} (known: {})", known.unwrap_or_default()));

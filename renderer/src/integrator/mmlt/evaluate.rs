@@ -41,7 +41,7 @@ impl<'a> Evaluator<'a> {
             size: Vec2::new(c.view.width as f32, c.view.height as f32),
             edges: edges as usize,
             techniques,
-            sizes: StepSizes::new(f64::from(options.step_min), f64::from(options.step_max)),
+            sizes: options.step_sizes(),
             camera: Subpath::default(),
             light: Subpath::default(),
         })
