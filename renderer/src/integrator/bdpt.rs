@@ -3,7 +3,7 @@
 
 use super::{UnitContext, tile};
 use crate::film::{Aov, Counters, Rect, SplatSums, TileSums};
-use crate::math::Ray;
+use crate::math::{Ray, Vec3};
 use crate::path::{Connection, Subpath, Tracer, VertexKind};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
@@ -174,15 +174,18 @@ pub fn render_tile(
     Some(tile)
 }
 
-/// What the first surface is, for the auxiliary images.
+/// What the walk met first, for the auxiliary images.
 fn first_hit(aov: &mut Aov, camera: &Subpath) {
     let [lens, first, ..] = camera.vertices.as_slice() else { return };
-    if let VertexKind::Surface(shading) = &first.kind {
-        aov.add(&Aov {
-            albedo: shading.bsdf.albedo().to_array(),
-            normal: shading.frame.n.to_array(),
-            depth: (first.anchor.p - lens.anchor.p).length(),
-            hits: 1.0,
-        });
-    }
+    let (albedo, normal) = match &first.kind {
+        VertexKind::Surface(shading) => (shading.bsdf.albedo(), shading.frame.n),
+        VertexKind::Medium(point) => (point.medium.albedo, Vec3::ZERO),
+        VertexKind::Lens | VertexKind::Light => return,
+    };
+    aov.add(&Aov {
+        albedo: albedo.to_array(),
+        normal: normal.to_array(),
+        depth: (first.anchor.p - lens.anchor.p).length(),
+        hits: 1.0,
+    });
 }

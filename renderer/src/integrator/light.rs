@@ -5,7 +5,7 @@
 
 use super::UnitContext;
 use crate::film::{Counters, SplatSums};
-use crate::math::{Anchor, Ray, Vec2};
+use crate::math::Vec2;
 use crate::path::{Subpath, Tracer};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
@@ -71,7 +71,8 @@ impl Film<'_> {
         let pixels = view.width as f32 * view.height as f32;
         let per_raster_area = view.camera.pdf_we(li.wi).1 * pixels;
         let value = li.radiance * (per_raster_area / (li.pdf * choice.pmf));
-        self.splat(choice.index, raster, value, || li.shadow_ray(&Anchor::free(lens)));
+        let from = self.tracer.lens(lens);
+        self.splat(choice.index, raster, value, |tracer| tracer.arriving(&from, li.wi, (&li).into()));
     }
 
     /// A walk from a light; each of its surfaces is connected to the camera. That adds an edge to those of the walk.
@@ -86,15 +87,15 @@ impl Film<'_> {
         let lens_u = self.tracer.lens_numbers(sampler);
         for s in 2..=walk.vertices.len() {
             if let Some(path) = self.tracer.to_lens(walk, s, lens_u)
-                && let (Some(raster), Some(ray)) = (path.raster, path.shadow)
+                && let Some(raster) = path.raster
             {
-                self.splat(start.index, raster, path.value, || ray);
+                self.splat(start.index, raster, path.value, |tracer| tracer.is_free(&path).then_some(Rgb::ONE));
             }
         }
     }
 
-    /// Adds a contribution at a raster position to all pixels whose filter covers it, if nothing is in the way.
-    fn splat(&mut self, light: usize, raster: Vec2, value: Rgb, shadow_ray: impl FnOnce() -> Ray) {
+    /// Adds a contribution at a raster position to all pixels whose filter covers it, or what of it `arrives`.
+    fn splat(&mut self, light: usize, raster: Vec2, value: Rgb, arrives: impl FnOnce(&mut Tracer<'_>) -> Option<Rgb>) {
         if value.is_black() || !self.tracer.counters.admit(value) {
             return;
         }
@@ -102,10 +103,8 @@ impl Film<'_> {
         if footprint.is_empty() {
             return;
         }
-        self.tracer.counters.rays += 1;
-        if self.c.scene.accel.occluded(&shadow_ray()) {
-            return;
-        }
+        let Some(transmittance) = arrives(&mut self.tracer) else { return };
+        let value = value * transmittance;
         let mut total = 0.0;
         for (x, y, weight) in footprint.iter() {
             self.splats.add(x, y, value * weight);

@@ -63,7 +63,7 @@ impl IntegratorKind {
     }
 
     /// Those that follow light through media.
-    const WITH_MEDIA: &[Self] = &[];
+    const WITH_MEDIA: &[Self] = &[Self::Light, Self::Bdpt];
 }
 
 impl std::str::FromStr for IntegratorKind {

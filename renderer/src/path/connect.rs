@@ -4,10 +4,12 @@
 //! the path carries over the density with which the strategy makes it, without its weight and without visibility.
 
 use super::mis::Step;
-use super::vertex::{Subpath, Vertex, VertexKind};
+use super::vertex::{Subpath, Vertex, abs_cos, distance_density};
 use super::walk::Tracer;
-use crate::bsdf::{ShadingPoint, Transport};
+use crate::bsdf::Transport;
 use crate::math::{Anchor, Ray, Vec2, Vec3};
+use crate::medium::Medium;
+use crate::scene::Target;
 use crate::spectrum::Rgb;
 
 /// A path made by one strategy.
@@ -31,25 +33,57 @@ impl Connection {
     }
 }
 
-impl Vertex {
-    /// The surface that is here, if it can be connected to.
-    #[inline]
-    fn connectible(&self) -> Option<&ShadingPoint> {
-        match &self.kind {
-            VertexKind::Surface(shading) if !shading.is_delta_only() => Some(shading),
-            _ => None,
-        }
-    }
-}
-
 /// Factor from a density of directions at `from` to the density of the vertex `at`, which they meet along `w`.
 #[inline]
 fn per_area(at: &Anchor, w: Vec3, d2: f64) -> f64 {
-    let cos = if at.ng == Vec3::ZERO { 1.0 } else { f64::from(at.ng.dot(w).abs()) };
-    cos / d2
+    abs_cos(at, w) / d2
+}
+
+/// The straight way between the two ends of a connection.
+struct Way {
+    /// The ray that must be free, unless that is known already.
+    shadow: Option<Ray>,
+    /// What media let through.
+    transmittance: Rgb,
+    /// Optical depth of the media that scatter.
+    tau: Rgb,
 }
 
 impl Tracer<'_> {
+    /// The way from a vertex to `target`, in direction `w`; `None` when it is known to be blocked. How much media let through takes part
+    /// in the weights, so where there are any the way is followed at once.
+    #[inline]
+    fn way(&mut self, from: &Vertex, w: Vec3, target: Target) -> Option<Way> {
+        if !self.scene.features.has_media() {
+            let shadow = match &target {
+                Target::Point(end) => from.anchor.segment_to(end),
+                Target::Direction(d) => from.anchor.ray(*d),
+            };
+            return Some(Way { shadow: Some(shadow), transmittance: Rgb::ONE, tau: Rgb::ZERO });
+        }
+        let around = from.around_towards(self.scene, w);
+        let through = self.scene.transmission(&from.anchor, &target, around, &mut self.counters.rays)?;
+        Some(Way { shadow: None, transmittance: through.transmittance, tau: through.tau })
+    }
+
+    /// What comes through from a vertex to `target` in direction `w`; `None` when nothing does.
+    pub fn arriving(&mut self, from: &Vertex, w: Vec3, target: Target) -> Option<Rgb> {
+        let way = self.way(from, w, target)?;
+        if let Some(ray) = &way.shadow {
+            self.counters.rays += 1;
+            if self.scene.accel.occluded(ray) {
+                return None;
+            }
+        }
+        Some(way.transmittance)
+    }
+
+    /// Density of the distance of a flight through media ([`distance_density`]).
+    #[inline]
+    fn distance(&self, tau: Rgb, end: Option<&Medium>) -> f64 {
+        if self.scene.features.has_media() { distance_density(tau, end) } else { 1.0 }
+    }
+
     /// Strategy (0, t): vertex t - 1 of the camera walk lies on a light.
     pub fn hit(&self, camera: &Subpath, t: usize) -> Option<Connection> {
         let at = &camera.vertices[t - 1];
@@ -66,7 +100,7 @@ impl Tracer<'_> {
         let (pdf_pos, pdf_dir) = light.pdf_le(&context, at.anchor.ng, w);
         // The light's point when sampled from the surface before it, over when a walk starts there.
         let solid = f64::from(light.pdf_li(&context, before.anchor.p, &at.anchor));
-        let direct = solid * at.edge.forward / f64::from(pdf_pos);
+        let direct = solid * at.edge.forward / at.edge.passes / f64::from(pdf_pos);
         let pdf_rev = f64::from(pmf * pdf_pos);
         let weight = self.hit_weight(camera, t, pdf_rev, at.pdf_fwd, direct, f64::from(pdf_dir) * at.edge.backward);
         Some(Connection { value, weight, shadow: None, raster: None })
@@ -86,11 +120,13 @@ impl Tracer<'_> {
             if t == 2 {
                 return Some(Connection { value, weight: 1.0, shadow: None, raster: None });
             }
-            let last = &camera.vertices[t - 2].anchor;
+            let last = &camera.vertices[t - 2];
             let pdf_rev = f64::from(self.selector.pmf(index as usize) * light.pdf_li_escaped(e.w));
             let (pdf_pos, _) = light.pdf_le(&self.scene.light_context(), -e.w, -e.w);
-            let before = f64::from(pdf_pos * last.ng.dot(e.w).abs());
-            let weight = self.hit_weight(camera, t, pdf_rev, e.pdf, 1.0, before);
+            let before = f64::from(pdf_pos) * abs_cos(&last.anchor, e.w);
+            // Through the media on the way out, and back.
+            let (out, back) = (self.distance(e.tau, None), self.distance(e.tau, last.medium()));
+            let weight = self.hit_weight(camera, t, pdf_rev, e.pdf * out, 1.0, before * back);
             Some(Connection { value, weight, shadow: None, raster: None })
         })
     }
@@ -114,63 +150,69 @@ impl Tracer<'_> {
     }
 
     /// Strategy (1, t), t > 1: a light sampled from vertex t - 1 of the camera walk.
-    pub fn next_event(&self, camera: &Subpath, t: usize, uc: f32, u: Vec2) -> Option<Connection> {
+    pub fn next_event(&mut self, camera: &Subpath, t: usize, uc: f32, u: Vec2) -> Option<Connection> {
         let at = &camera.vertices[t - 1];
-        let shading = at.connectible()?;
+        let scattering = at.connectible()?;
         let choice = self.selector.sample(uc)?;
         let light = &self.scene.lights[choice.index];
         let context = self.scene.light_context();
         let li = light.sample_li(&context, at.anchor.p, choice.u, u)?;
-        let (f, pdf_bsdf) = shading.eval_pdf(li.wi, Transport::Radiance);
+        let (f, pdf_dir) = scattering.eval_pdf(li.wi, Transport::Radiance);
         let pdf = li.pdf * choice.pmf;
-        let value = at.beta * f * li.radiance * (shading.abs_cos(li.wi) / pdf);
+        let value = at.beta * f * li.radiance * (scattering.abs_cos(li.wi) / pdf);
         if value.is_black() {
             return None;
         }
+        let way = self.way(at, li.wi, (&li).into())?;
+        let value = value * way.transmittance;
 
         // Densities of a walk that starts at this point of the light.
         let flags = light.flags();
-        let (pdf_pos, pdf_dir) = light.pdf_le(&context, li.light.ng, -li.wi);
-        let (pdf_pos, pdf_dir) = (f64::from(pdf_pos), f64::from(pdf_dir));
+        let (pdf_pos, pdf_emit) = light.pdf_le(&context, li.light.ng, -li.wi);
+        let (pdf_pos, pdf_emit) = (f64::from(pdf_pos), f64::from(pdf_emit));
         let (onwards, direct) = if flags.infinite {
-            (pdf_pos * f64::from(at.anchor.ng.dot(li.wi).abs()), 1.0)
+            (pdf_pos * abs_cos(&at.anchor, li.wi), 1.0)
         } else {
             let d2 = f64::from(li.dist) * f64::from(li.dist);
             let direct = if li.delta { 1.0 } else { f64::from(li.pdf) * per_area(&li.light, li.wi, d2) / pdf_pos };
-            (pdf_dir * per_area(&at.anchor, li.wi, d2), direct)
+            (pdf_emit * per_area(&at.anchor, li.wi, d2), direct)
         };
-        let back = f64::from(shading.pdf_reverse(li.wi, Transport::Importance)) * at.edge.backward;
+        let onwards = onwards * self.distance(way.tau, at.medium());
+        let back = f64::from(scattering.pdf_reverse(li.wi, Transport::Importance)) * at.edge.backward;
         let h = self.heuristic;
         let camera_sum = camera.beyond(h, t - 1, onwards, back);
         // The camera walk that hits the light: its density over that of sampling the light, in the same measure.
         let reach = if li.delta { 0.0 } else { direct };
-        let light_sum = h.fold(0.0, Step { ratio: f64::from(pdf_bsdf) / f64::from(pdf), reach });
+        let ratio = f64::from(pdf_dir) * self.distance(way.tau, None) / f64::from(pdf);
+        let light_sum = h.fold(0.0, Step { ratio, reach });
         let weight = h.weight(light_sum, camera_sum, direct);
-        Some(Connection { value, weight, shadow: Some(li.shadow_ray(&at.anchor)), raster: None })
+        Some(Connection { value, weight, shadow: way.shadow, raster: None })
     }
 
     /// Strategy (s, 1), s > 1: vertex s - 1 of the light walk seen from the lens. The contribution is that of the whole picture, to be
     /// weighted by the filter at `raster`.
-    pub fn to_lens(&self, light: &Subpath, s: usize, lens_u: Vec2) -> Option<Connection> {
+    pub fn to_lens(&mut self, light: &Subpath, s: usize, lens_u: Vec2) -> Option<Connection> {
         let at = &light.vertices[s - 1];
-        let shading = at.connectible()?;
+        let scattering = at.connectible()?;
         let we = self.camera.sample_we(at.anchor.p, lens_u)?;
-        let f = shading.eval(we.wi, Transport::Importance);
-        let cos = shading.abs_cos(we.wi) * shading.adjoint_correction(we.wi);
+        let (f, _) = scattering.eval_pdf(we.wi, Transport::Importance);
+        let cos = scattering.abs_cos(we.wi) * scattering.adjoint_correction(we.wi);
         let value = at.beta * f * (cos * we.we / we.pdf);
         if value.is_black() {
             return None;
         }
+        let way = self.way(at, we.wi, Target::Point(we.lens))?;
+        let value = value * way.transmittance;
         let (_, pdf_dir) = self.camera.pdf_we(-we.wi);
         let d2 = f64::from(we.dist) * f64::from(we.dist);
-        let onwards = f64::from(pdf_dir) * per_area(&at.anchor, we.wi, d2);
-        let back = f64::from(shading.pdf_reverse(we.wi, Transport::Radiance)) * at.edge.backward;
+        let onwards = f64::from(pdf_dir) * per_area(&at.anchor, we.wi, d2) * self.distance(way.tau, at.medium());
+        let back = f64::from(scattering.pdf_reverse(we.wi, Transport::Radiance)) * at.edge.backward;
         let weight = self.heuristic.weight(light.beyond(self.heuristic, s - 1, onwards, back), 0.0, 1.0);
-        Some(Connection { value, weight, shadow: Some(we.shadow_ray(&at.anchor)), raster: Some(we.raster) })
+        Some(Connection { value, weight, shadow: way.shadow, raster: Some(we.raster) })
     }
 
     /// Strategy (s, t), s > 1, t > 1: the two ends joined.
-    pub fn join(&self, light: &Subpath, s: usize, camera: &Subpath, t: usize) -> Option<Connection> {
+    pub fn join(&mut self, light: &Subpath, s: usize, camera: &Subpath, t: usize) -> Option<Connection> {
         let (x, z) = (&light.vertices[s - 1], &camera.vertices[t - 1]);
         let (at_x, at_z) = (x.connectible()?, z.connectible()?);
         let d = x.anchor.p - z.anchor.p;
@@ -189,14 +231,16 @@ impl Tracer<'_> {
         if value.is_black() {
             return None;
         }
+        let way = self.way(z, w, Target::Point(x.anchor))?;
+        let value = value * way.transmittance;
         let d2 = f64::from(d2);
-        let to_x = f64::from(pdf_z) * per_area(&x.anchor, w, d2);
-        let to_z = f64::from(pdf_x) * per_area(&z.anchor, w, d2);
+        let to_x = f64::from(pdf_z) * per_area(&x.anchor, w, d2) * self.distance(way.tau, x.medium());
+        let to_z = f64::from(pdf_x) * per_area(&z.anchor, w, d2) * self.distance(way.tau, z.medium());
         let back_x = f64::from(at_x.pdf_reverse(-w, Transport::Radiance)) * x.edge.backward;
         let back_z = f64::from(at_z.pdf_reverse(w, Transport::Importance)) * z.edge.backward;
         let h = self.heuristic;
         let weight = h.weight(light.beyond(h, s - 1, to_x, back_x), camera.beyond(h, t - 1, to_z, back_z), 1.0);
-        Some(Connection { value, weight, shadow: Some(z.anchor.segment_to(&x.anchor)), raster: None })
+        Some(Connection { value, weight, shadow: way.shadow, raster: None })
     }
 
     /// Whether nothing is in a path's way.

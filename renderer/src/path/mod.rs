@@ -4,11 +4,13 @@
 mod connect;
 mod counters;
 pub mod mis;
+mod scattering;
 mod vertex;
 mod walk;
 
 pub use connect::Connection;
 pub use counters::Counters;
+pub use scattering::{MediumPoint, Scattering};
 pub use vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};
 pub use walk::Tracer;
 

@@ -1,7 +1,11 @@
 use super::mis::{Heuristic, Step};
+use super::scattering::MediumPoint;
 use crate::bsdf::ShadingPoint;
+use crate::geometry::ObjectId;
 use crate::light::LightFlags;
 use crate::math::{Anchor, Vec3};
+use crate::medium::{Medium, passing_probability};
+use crate::scene::{Enclosures, Scene};
 use crate::spectrum::Rgb;
 
 /// What is at a vertex.
@@ -13,6 +17,8 @@ pub enum VertexKind {
     Light,
     /// A surface.
     Surface(ShadingPoint),
+    /// A point of a medium.
+    Medium(MediumPoint),
 }
 
 /// A vertex of a walk.
@@ -32,41 +38,100 @@ pub struct Vertex {
     pub delta: bool,
     /// Relative densities of the strategies that connect at or beyond this vertex, for a walk that went at least two vertices on.
     pub tail: f64,
+    /// What encloses it, on the side from which the walk came.
+    pub around: Enclosures,
+    /// The object whose surface it is on, which may have a medium inside.
+    pub object: Option<ObjectId>,
     /// What the surface emits towards the vertex before: index of the light and radiance.
     pub emitted: Option<(u32, Rgb)>,
 }
 
-/// Turns densities of directions into densities of vertices. A medium's distance densities belong into these two factors.
+impl Vertex {
+    /// The first vertex of a walk.
+    pub(super) fn first(kind: VertexKind, anchor: Anchor, pdf_fwd: f64) -> Self {
+        Self {
+            kind,
+            anchor,
+            beta: Rgb::ONE,
+            pdf_fwd,
+            edge: Edge::NONE,
+            delta: false,
+            tail: 0.0,
+            around: Enclosures::default(),
+            object: None,
+            emitted: None,
+        }
+    }
+
+    /// The medium whose point it is.
+    #[inline]
+    pub fn medium(&self) -> Option<&Medium> {
+        match &self.kind {
+            VertexKind::Medium(point) => Some(&point.medium),
+            _ => None,
+        }
+    }
+
+    /// What encloses a ray that leaves in direction `w`.
+    #[inline]
+    pub fn around_towards(&self, scene: &Scene, w: Vec3) -> Enclosures {
+        match self.object {
+            Some(object) => scene.beside(object, self.anchor.ng.dot(w) < 0.0, &self.around),
+            None => self.around,
+        }
+    }
+}
+
+/// Turns densities of directions into densities of vertices, those of distances in media included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
     /// Density of the far vertex over that of the direction towards it.
     pub forward: f64,
     /// Density of the near vertex over that of the direction back to it.
     pub backward: f64,
+    /// Probability that a flight comes this far through the media on the way; part of the density of a vertex on a surface.
+    pub passes: f64,
 }
 
 impl Edge {
     /// No edge: the first vertex of a walk has none behind it.
-    pub const NONE: Self = Self { forward: 0.0, backward: 0.0 };
+    pub const NONE: Self = Self { forward: 0.0, backward: 0.0, passes: 1.0 };
 
     /// Between two points, with `w` the unit direction from the first to the second.
     #[inline]
     pub fn between(from: &Anchor, to: &Anchor, w: Vec3) -> Self {
         let d2 = f64::from((to.p - from.p).length_squared());
-        Self { forward: abs_cos(to, w) / d2, backward: abs_cos(from, w) / d2 }
+        Self { forward: abs_cos(to, w) / d2, backward: abs_cos(from, w) / d2, passes: 1.0 }
     }
 
     /// From a light infinitely far away, whose light travels along `w`: its direction is its vertex, and the point on the disk through
     /// which the ray came is the first surface's.
     #[inline]
     pub fn from_infinity(to: &Anchor, w: Vec3) -> Self {
-        Self { forward: abs_cos(to, w), backward: 1.0 }
+        Self { forward: abs_cos(to, w), backward: 1.0, passes: 1.0 }
     }
+
+    /// The edge through scattering media of optical depth `tau`; `from` and `to` are the media of its ends that are points of one.
+    #[inline]
+    pub fn through(self, tau: Rgb, from: Option<&Medium>, to: Option<&Medium>) -> Self {
+        Self {
+            forward: self.forward * distance_density(tau, to),
+            backward: self.backward * distance_density(tau, from),
+            passes: f64::from(passing_probability(tau)),
+        }
+    }
+}
+
+/// Density of the distance of a flight through scattering media of optical depth `tau`: per length where it ends in a medium, the
+/// probability of coming so far where it ends at a surface.
+#[inline]
+pub fn distance_density(tau: Rgb, end: Option<&Medium>) -> f64 {
+    f64::from(end.map_or_else(|| passing_probability(tau), |medium| medium.scatter_density(tau)))
 }
 
 /// `|cos|` of the angle between a direction and a surface's geometric normal; 1 for a point in free space.
 #[inline]
-fn abs_cos(at: &Anchor, w: Vec3) -> f64 {
+pub(super) fn abs_cos(at: &Anchor, w: Vec3) -> f64 {
     if at.ng == Vec3::ZERO { 1.0 } else { f64::from(at.ng.dot(w).abs()) }
 }
 
@@ -90,6 +155,8 @@ pub struct Escape {
     pub beta: Rgb,
     /// Density of the direction per solid angle.
     pub pdf: f64,
+    /// Optical depth of the scattering media on the way out.
+    pub tau: Rgb,
 }
 
 /// A walk from one end of a path; reused from path to path.

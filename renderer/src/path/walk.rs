@@ -1,14 +1,15 @@
 //! Random walks from the camera and from the lights.
 
 use super::mis::{Heuristic, delta_density};
+use super::scattering::MediumPoint;
 use super::vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};
 use super::{Counters, roulette};
 use crate::bsdf::{DirectionSample, ShadingPoint, Transport};
 use crate::camera::Camera;
 use crate::light::LightSelector;
-use crate::math::{Anchor, Ray, Vec2};
+use crate::math::{Anchor, Ray, Vec2, Vec3};
 use crate::sampling::Sampler;
-use crate::scene::Scene;
+use crate::scene::{Enclosures, Event, Scene};
 use crate::spectrum::Rgb;
 
 /// Traces and connects walks.
@@ -36,6 +37,8 @@ struct Head {
     pdf: f64,
     /// What the roulette measures `beta` by.
     unit: f32,
+    /// What encloses the ray.
+    around: Enclosures,
 }
 
 impl Tracer<'_> {
@@ -43,18 +46,17 @@ impl Tracer<'_> {
     pub fn camera_walk(&mut self, path: &mut Subpath, sampler: &mut impl Sampler, ray: Ray, limit: usize) {
         path.clear();
         let (pdf_pos, pdf_dir) = self.camera.pdf_we(ray.d);
-        path.vertices.push(Vertex {
-            kind: VertexKind::Lens,
-            anchor: Anchor::free(ray.o),
-            beta: Rgb::ONE,
-            pdf_fwd: f64::from(pdf_pos),
-            edge: Edge::NONE,
-            delta: false,
-            tail: 0.0,
-            emitted: None,
-        });
-        let head = Head { ray, beta: Rgb::ONE, pdf: f64::from(pdf_dir), unit: 1.0 };
+        let lens = Vertex { pdf_fwd: f64::from(pdf_pos), ..self.lens(ray.o) };
+        let around = lens.around;
+        path.vertices.push(lens);
+        let head = Head { ray, beta: Rgb::ONE, pdf: f64::from(pdf_dir), unit: 1.0, around };
         self.walk(path, sampler, head, Transport::Radiance, limit);
+    }
+
+    /// A vertex on the lens.
+    pub fn lens(&self, p: Vec3) -> Vertex {
+        let around = self.scene.camera_enclosures;
+        Vertex { around, ..Vertex::first(VertexKind::Lens, Anchor::free(p), 0.0) }
     }
 
     /// Walks from a light until there are `limit` vertices, the light among them.
@@ -69,75 +71,36 @@ impl Tracer<'_> {
         let (pdf_pos, pdf_dir) = (f64::from(le.pdf_pos), f64::from(le.pdf_dir));
         let (own, onwards) = if le.flags.infinite { (pdf_dir, pdf_pos) } else { (pdf_pos, pdf_dir) };
         path.light = Some(LightStart { index: choice.index, flags: le.flags, direct: 1.0 });
-        path.vertices.push(Vertex {
-            kind: VertexKind::Light,
-            anchor: le.light,
-            beta: Rgb::ONE,
-            pdf_fwd: pmf * own,
-            edge: Edge::NONE,
-            delta: false,
-            tail: 0.0,
-            emitted: None,
-        });
+        path.vertices.push(Vertex::first(VertexKind::Light, le.light, pmf * own));
         let beta = le.throughput() / choice.pmf;
-        let head = Head { ray: le.ray, beta, pdf: onwards, unit: beta.max_component() };
+        let around = if !self.scene.features.has_media() {
+            Enclosures::default()
+        } else if le.flags.infinite && self.scene.medium_in(&Enclosures::default()).is_some() {
+            // Nothing comes from infinitely far through a medium, and so not from the disk either.
+            return;
+        } else {
+            self.scene.enclosures_of_light(choice.index, &le.light, le.ray.d)
+        };
+        let head = Head { ray: le.ray, beta, pdf: onwards, unit: beta.max_component(), around };
         self.walk(path, sampler, head, Transport::Importance, limit);
     }
 
     fn walk(&mut self, path: &mut Subpath, sampler: &mut impl Sampler, mut head: Head, mode: Transport, limit: usize) {
-        let scene = self.scene;
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
         while path.vertices.len() < limit && self.counters.admit(head.beta) && !head.beta.is_black() {
-            // Find the next surface.
+            // Find the next surface, or the point of a medium that scatters.
             let edges = path.vertices.len() as u32;
             sampler.start_vertex(edges);
-            self.counters.rays += 1;
-            let Some(hit) = scene.accel.intersect(&head.ray) else {
-                path.escape = Some(Escape { w: head.ray.d, beta: head.beta, pdf: head.pdf });
-                return;
-            };
-            let hit = scene.geometry.interaction(&head.ray, &hit);
-            let wo = -head.ray.d;
-            let edge = self.edge_to(path, &hit.anchor(), &head.ray);
-            let info = &scene.objects[hit.object.0 as usize];
-            let shading = ShadingPoint::new(&scene.materials, &scene.textures, info.material, &hit, wo);
-            let emitted = match (mode, info.light) {
-                (Transport::Radiance, Some(index)) => {
-                    Some((index, scene.lights[index as usize].radiance(&scene.light_context(), &hit, wo)))
-                }
-                _ => None,
-            };
-            path.vertices.push(Vertex {
-                kind: VertexKind::Surface(shading),
-                anchor: hit.anchor(),
-                beta: head.beta,
-                pdf_fwd: head.pdf * edge.forward,
-                edge,
-                delta: false,
-                tail: 0.0,
-                emitted,
-            });
+            let Some(vertex) = self.arrive(path, sampler, &mut head, mode) else { return };
+            path.vertices.push(vertex);
             if path.vertices.len() >= limit {
                 return;
             }
 
-            // Go on in a direction drawn from the BSDF.
-            let (uc, u) = (sampler.next_1d(), sampler.next_2d());
-            let Some(s) = shading.sample(uc, u, mode) else { return };
-            self.leave(path, &shading, &s, mode);
-            head.beta *= s.weight();
-            if mode == Transport::Importance {
-                head.beta *= shading.adjoint_correction(s.wi);
-            } else {
-                eta_scale *= s.eta * s.eta;
-            }
-            head.pdf = match (s.lobe.delta, mode) {
-                (false, _) => f64::from(s.pdf),
-                (true, Transport::Radiance) => delta_density(s.cos_theta, shading.wo.z.abs(), s.eta),
-                (true, Transport::Importance) => 1.0,
-            };
-            head.ray = hit.spawn_ray(s.wi);
+            // Go on in a direction drawn from what scatters there.
+            let Some(eta) = self.depart(path, sampler, &mut head, mode) else { return };
+            eta_scale *= eta * eta;
 
             // End the walk by chance when it carries little of what it started with. The chance depends on the walk's history, so it
             // stays out of the densities.
@@ -149,35 +112,121 @@ impl Tracer<'_> {
         }
     }
 
-    /// The edge from the last vertex to `to`, along `ray`.
+    /// Follows the walk's ray to its next vertex, or notes that it left the scene.
     #[inline]
-    fn edge_to(&self, path: &mut Subpath, to: &Anchor, ray: &Ray) -> Edge {
-        let from = path.vertices[path.vertices.len() - 1].anchor;
-        let Some(light) = path.light.as_mut().filter(|_| path.vertices.len() == 1) else {
-            return Edge::between(&from, to, ray.d);
+    fn arrive(
+        &mut self,
+        path: &mut Subpath,
+        sampler: &mut impl Sampler,
+        head: &mut Head,
+        mode: Transport,
+    ) -> Option<Vertex> {
+        let scene = self.scene;
+        let (event, tau) = if scene.features.has_media() {
+            let flight = scene.fly(&head.ray, head.around, sampler.next_1d(), &mut self.counters.rays);
+            head.beta *= flight.weight;
+            head.around = flight.around;
+            (flight.event, flight.tau)
+        } else {
+            self.counters.rays += 1;
+            let hit = scene.accel.intersect(&head.ray);
+            let event = hit.map_or(Event::Escaped, |h| Event::Surface(scene.geometry.interaction(&head.ray, &h)));
+            (event, Rgb::ZERO)
         };
-        if light.flags.infinite {
-            return Edge::from_infinity(to, ray.d);
+        let wo = -head.ray.d;
+        let mut vertex = match &event {
+            Event::Escaped => {
+                path.escape = Some(Escape { w: head.ray.d, beta: head.beta, pdf: head.pdf, tau });
+                return None;
+            }
+            Event::Scatter { p, medium } => {
+                let point = MediumPoint { medium: scene.media[medium.0 as usize], wo };
+                Vertex::first(VertexKind::Medium(point), Anchor::free(*p), 0.0)
+            }
+            Event::Surface(hit) => {
+                let info = &scene.objects[hit.object.0 as usize];
+                let shading = ShadingPoint::new(&scene.materials, &scene.textures, info.material, hit, wo);
+                let mut vertex = Vertex::first(VertexKind::Surface(shading), hit.anchor(), 0.0);
+                vertex.object = Some(hit.object);
+                if let (Transport::Radiance, Some(index)) = (mode, info.light) {
+                    let radiance = scene.lights[index as usize].radiance(&scene.light_context(), hit, wo);
+                    vertex.emitted = Some((index, radiance));
+                }
+                vertex
+            }
+        };
+        vertex.beta = head.beta;
+        vertex.around = head.around;
+        vertex.edge = self.edge_to(path, &vertex, &head.ray, tau);
+        vertex.pdf_fwd = head.pdf * vertex.edge.forward;
+        Some(vertex)
+    }
+
+    /// The walk leaves its last vertex in a direction drawn there. The index of refraction ahead over that behind, which radiance is
+    /// scaled by the square of; `None` where the walk ends.
+    #[inline]
+    fn depart(&self, path: &mut Subpath, sampler: &mut impl Sampler, head: &mut Head, mode: Transport) -> Option<f32> {
+        let (uc, u) = (sampler.next_1d(), sampler.next_2d());
+        let last = path.vertices.last()?;
+        let s = match &last.kind {
+            VertexKind::Surface(shading) => shading.sample(uc, u, mode)?,
+            VertexKind::Medium(point) => point.sample(u),
+            VertexKind::Lens | VertexKind::Light => return None,
+        };
+        head.beta *= s.weight();
+        if let (Transport::Importance, VertexKind::Surface(shading)) = (mode, &last.kind) {
+            head.beta *= shading.adjoint_correction(s.wi);
         }
-        let edge = Edge::between(&from, to, ray.d);
+        head.pdf = match (s.lobe.delta, mode, &last.kind) {
+            (true, Transport::Radiance, VertexKind::Surface(shading)) => {
+                delta_density(s.cos_theta, shading.wo.z.abs(), s.eta)
+            }
+            (true, ..) => 1.0,
+            (false, ..) => f64::from(s.pdf),
+        };
+        head.ray = last.anchor.ray(s.wi);
+        if self.scene.features.has_media() {
+            head.around = last.around_towards(self.scene, s.wi);
+        }
+        self.leave(path, &s, mode);
+        Some(if mode == Transport::Radiance { s.eta } else { 1.0 })
+    }
+
+    /// The edge from the last vertex to `to`, along `ray`, through scattering media of optical depth `tau`.
+    #[inline]
+    fn edge_to(&self, path: &mut Subpath, to: &Vertex, ray: &Ray, tau: Rgb) -> Edge {
+        let from = &path.vertices[path.vertices.len() - 1];
+        let edge = match path.light {
+            Some(light) if light.flags.infinite && path.vertices.len() == 1 => Edge::from_infinity(&to.anchor, ray.d),
+            _ => Edge::between(&from.anchor, &to.anchor, ray.d),
+        };
         // How likely the light's point is when it is sampled from here.
-        if !light.flags.is_delta() {
+        if let Some(light) = path.light.as_mut().filter(|_| path.vertices.len() == 1)
+            && !light.flags.infinite
+            && !light.flags.is_delta()
+        {
             let pdf = self.selector.pmf(light.index)
-                * self.scene.lights[light.index].pdf_li(&self.scene.light_context(), to.p, &from);
-            light.direct = f64::from(pdf) * edge.backward / path.vertices[0].pdf_fwd;
+                * self.scene.lights[light.index].pdf_li(&self.scene.light_context(), to.anchor.p, &from.anchor);
+            light.direct = f64::from(pdf) * edge.backward / from.pdf_fwd;
         }
-        edge
+        if self.scene.features.has_media() { edge.through(tau, from.medium(), to.medium()) } else { edge }
     }
 
     /// The walk leaves its last vertex by `s`: now the way back from here to the vertex before is known.
     #[inline]
-    fn leave(&self, path: &mut Subpath, shading: &ShadingPoint, s: &DirectionSample, mode: Transport) {
+    fn leave(&self, path: &mut Subpath, s: &DirectionSample, mode: Transport) {
         let last = path.vertices.len() - 1;
-        let pdf_back = match (s.lobe.delta, mode) {
-            (false, Transport::Radiance) => f64::from(shading.pdf_reverse(s.wi, Transport::Importance)),
-            (false, Transport::Importance) => f64::from(shading.pdf_reverse(s.wi, Transport::Radiance)),
-            (true, Transport::Radiance) => 1.0,
-            (true, Transport::Importance) => delta_density(shading.wo.z.abs(), s.cos_theta, 1.0 / s.eta),
+        let back = match mode {
+            Transport::Radiance => Transport::Importance,
+            Transport::Importance => Transport::Radiance,
+        };
+        let pdf_back = match (&path.vertices[last].kind, s.lobe.delta) {
+            (VertexKind::Surface(shading), false) => f64::from(shading.pdf_reverse(s.wi, back)),
+            (VertexKind::Surface(shading), true) if mode == Transport::Importance => {
+                delta_density(shading.wo.z.abs(), s.cos_theta, 1.0 / s.eta)
+            }
+            (VertexKind::Medium(point), _) => f64::from(point.medium.phase.pdf(s.wi, point.wo)),
+            _ => 1.0,
         };
         let before = path.vertices.get(last.wrapping_sub(2)).map_or(0.0, |v| v.tail);
         let step = path.step(last - 1, pdf_back * path.vertices[last].edge.backward, false);

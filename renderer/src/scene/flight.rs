@@ -3,6 +3,7 @@
 
 use super::{Enclosures, Scene};
 use crate::geometry::Interaction;
+use crate::light::LiSample;
 use crate::math::rounding::{gamma, offset_ray_origin};
 use crate::math::{Anchor, Ray, Vec3};
 use crate::medium::{Medium, MediumId, Reach, passing_weight, transmittance};
@@ -51,6 +52,12 @@ pub enum Target {
     Point(Anchor),
     /// Infinitely far, in this unit direction.
     Direction(Vec3),
+}
+
+impl From<&LiSample> for Target {
+    fn from(li: &LiSample) -> Self {
+        if li.dist.is_infinite() { Self::Direction(li.wi) } else { Self::Point(li.light) }
+    }
 }
 
 /// What comes through between two points.

@@ -1,9 +1,9 @@
-use crate::oracle::{Path, Start, weights};
-use crate::scenes;
+use crate::oracle::{Path, Point, Start, weights};
+use crate::scenes::{self, Fog};
 use renderer::camera::Camera;
-use renderer::math::{Anchor, Vec2};
+use renderer::math::Vec2;
 use renderer::path::mis::Heuristic;
-use renderer::path::{Connection, Counters, Subpath, Tracer};
+use renderer::path::{Connection, Counters, Subpath, Tracer, Vertex};
 use renderer::sampling::{IndependentSampler, Sampler};
 use renderer::scene::Scene;
 
@@ -20,9 +20,10 @@ struct Sample<'a> {
 fn points(sample: &Sample<'_>, s: usize, t: usize, sampled: Option<(usize, Start)>) -> Path {
     let (camera, light) = (&sample.camera.vertices, &sample.light.vertices);
     let scene = sample.tracer.scene;
-    let mut surfaces: Vec<Anchor> = light[..s].iter().skip(1).map(|v| v.anchor).collect();
+    let point = |v: &Vertex| Point { anchor: v.anchor, medium: v.medium().copied() };
+    let mut points: Vec<Point> = light[..s].iter().skip(1).map(point).collect();
     let from_camera = if s == 0 { t - 1 } else { t };
-    surfaces.extend(camera[1..from_camera].iter().rev().map(|v| v.anchor));
+    points.extend(camera[1..from_camera].iter().rev().map(point));
     let (index, start) = match s {
         0 if camera.len() < t => {
             let index = scene.infinite_lights.iter().find(|i| !scene.lights[**i as usize].flags().is_delta());
@@ -37,11 +38,11 @@ fn points(sample: &Sample<'_>, s: usize, t: usize, sampled: Option<(usize, Start
             (start.index, start_at)
         }
     };
-    Path { light: index, start, surfaces, lens: camera[0].anchor.p }
+    Path { light: index, start, points, lens: camera[0].anchor.p }
 }
 
 /// Compares every strategy of one sample; returns how many paths there were.
-fn compare(sample: &mut Sample<'_>, view: &Camera, numbers: &mut IndependentSampler, what: &str) -> usize {
+fn compare(sample: &mut Sample<'_>, view: &Camera, fog: &Fog, numbers: &mut IndependentSampler, what: &str) -> usize {
     let mut count = 0;
     let (uc, u) = (numbers.next_1d(), numbers.next_2d());
     let scene = sample.tracer.scene;
@@ -69,7 +70,7 @@ fn compare(sample: &mut Sample<'_>, view: &Camera, numbers: &mut IndependentSamp
             if !points.is_well_conditioned() {
                 continue;
             }
-            let expected = weights(scene, view, &points)[s];
+            let expected = weights(scene, view, fog, &points)[s];
             let difference = (path.weight - expected).abs();
             assert!(difference < 1e-5, "{what}: ({s}, {t}) weighs {}, should be {expected}", path.weight);
             count += 1;
@@ -88,7 +89,7 @@ fn light_point(scene: &Scene, camera: &Subpath, t: usize, uc: f32, u: Vec2) -> O
 
 #[test]
 fn every_weight_is_that_of_the_oracle() {
-    for (what, scene) in scenes::all() {
+    for (what, scene, fog) in scenes::all() {
         let view = Camera::new(&scene.camera, 64, 64).unwrap();
         let tracer = Tracer {
             scene: &scene,
@@ -105,7 +106,7 @@ fn every_weight_is_that_of_the_oracle() {
             let ray = view.generate_ray(numbers.next_2d() * 64.0, Vec2::ZERO);
             sample.tracer.camera_walk(&mut sample.camera, &mut IndependentSampler::new([52, index]), ray, EDGES + 1);
             sample.tracer.light_walk(&mut sample.light, &mut IndependentSampler::new([53, index]), EDGES);
-            count += compare(&mut sample, &view, &mut numbers, what);
+            count += compare(&mut sample, &view, &fog, &mut numbers, what);
         }
         assert!(count > 1000, "{what}: {count} paths");
     }

@@ -1,0 +1,88 @@
+//! What scatters at a vertex, surface or medium, in one interface.
+
+use super::vertex::{Vertex, VertexKind};
+use crate::bsdf::{DirectionSample, Lobe, ShadingPoint, Transport};
+use crate::math::{Vec2, Vec3};
+use crate::medium::Medium;
+use crate::spectrum::Rgb;
+
+/// A point of a medium that scatters, seen from `wo`. The scattering coefficient is in the weight of the flight that came here; what is
+/// left is the phase function.
+#[derive(Clone, Copy, Debug)]
+pub struct MediumPoint {
+    /// The medium.
+    pub medium: Medium,
+    /// Unit direction to the previous vertex.
+    pub wo: Vec3,
+}
+
+impl MediumPoint {
+    /// Draws `wi`.
+    #[inline]
+    pub fn sample(&self, u: Vec2) -> DirectionSample {
+        let (wi, pdf) = self.medium.phase.sample(self.wo, u);
+        DirectionSample { wi, f: Rgb::splat(pdf), pdf, cos_theta: 1.0, lobe: Lobe::DIFFUSE, eta: 1.0 }
+    }
+}
+
+/// What scatters at a vertex.
+#[derive(Clone, Copy, Debug)]
+pub enum Scattering<'a> {
+    /// A BSDF.
+    Surface(&'a ShadingPoint),
+    /// A phase function.
+    Medium(&'a MediumPoint),
+}
+
+impl Vertex {
+    /// What scatters here, if it can be connected to.
+    #[inline]
+    pub(super) fn connectible(&self) -> Option<Scattering<'_>> {
+        match &self.kind {
+            VertexKind::Surface(shading) if !shading.is_delta_only() => Some(Scattering::Surface(shading)),
+            VertexKind::Medium(point) => Some(Scattering::Medium(point)),
+            _ => None,
+        }
+    }
+}
+
+impl Scattering<'_> {
+    /// Value without cosine and density per solid angle for `wi`.
+    #[inline]
+    pub fn eval_pdf(&self, wi: Vec3, mode: Transport) -> (Rgb, f32) {
+        match self {
+            Self::Surface(shading) => shading.eval_pdf(wi, mode),
+            Self::Medium(point) => {
+                let pdf = point.medium.phase.pdf(point.wo, wi);
+                (Rgb::splat(pdf), pdf)
+            }
+        }
+    }
+
+    /// Density per solid angle of drawing `wo` by a walk that comes from `wi` in `mode`.
+    #[inline]
+    pub fn pdf_reverse(&self, wi: Vec3, mode: Transport) -> f32 {
+        match self {
+            Self::Surface(shading) => shading.pdf_reverse(wi, mode),
+            Self::Medium(point) => point.medium.phase.pdf(wi, point.wo),
+        }
+    }
+
+    /// `|cos|` of the angle between `w` and the shading normal; 1 in a medium.
+    #[inline]
+    pub fn abs_cos(&self, w: Vec3) -> f32 {
+        match self {
+            Self::Surface(shading) => shading.abs_cos(w),
+            Self::Medium(_) => 1.0,
+        }
+    }
+
+    /// By which importance is multiplied at a surface with a shading normal ([`ShadingPoint::adjoint_correction`]).
+    #[inline]
+    pub fn adjoint_correction(&self, wi: Vec3) -> f32 {
+        match self {
+            Self::Surface(shading) => shading.adjoint_correction(wi),
+            Self::Medium(_) => 1.0,
+        }
+    }
+}
