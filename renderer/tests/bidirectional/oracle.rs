@@ -233,7 +233,8 @@ fn scatter(scene: &Scene, at: &Met, wo: Vec3, to: Vec3, mode: Transport) -> f64 
             // Henyey and Greenstein, in the textbook form.
             let g = f64::from(medium.phase.mean_cosine());
             let cos = -wo.as_dvec3().dot(wi.as_dvec3());
-            (1.0 - g * g) / (4.0 * std::f64::consts::PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5))
+            let d = 1.0 + g * g - 2.0 * g * cos;
+            (1.0 - g * g) / (4.0 * std::f64::consts::PI * d * d.sqrt())
         }
     }
 }
