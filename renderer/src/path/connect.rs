@@ -52,7 +52,7 @@ struct Way {
 impl Tracer<'_> {
     /// The way from a vertex to `target`, in direction `w`; `None` when it is known to be blocked. How much media let through takes part
     /// in the weights, so where there are any the way is followed at once.
-    #[inline]
+    #[inline(always)]
     fn way(&mut self, from: &Vertex, w: Vec3, target: Target) -> Option<Way> {
         if !self.scene.features.has_media() {
             let shadow = match &target {
@@ -61,8 +61,14 @@ impl Tracer<'_> {
             };
             return Some(Way { shadow: Some(shadow), transmittance: Rgb::ONE, tau: Rgb::ZERO });
         }
+        self.way_through_media(from, w, &target)
+    }
+
+    /// The same where there are media. Apart, so that it costs nothing where there are none.
+    #[inline(never)]
+    fn way_through_media(&mut self, from: &Vertex, w: Vec3, target: &Target) -> Option<Way> {
         let around = from.around_towards(self.scene, w);
-        let through = self.scene.transmission(&from.anchor, &target, around, &mut self.counters.rays)?;
+        let through = self.scene.transmission(&from.anchor, target, around, &mut self.counters.rays)?;
         Some(Way { shadow: None, transmittance: through.transmittance, tau: through.tau })
     }
 

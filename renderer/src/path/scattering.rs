@@ -48,7 +48,7 @@ impl Vertex {
 
 impl Scattering<'_> {
     /// Value without cosine and density per solid angle for `wi`.
-    #[inline]
+    #[inline(always)]
     pub fn eval_pdf(&self, wi: Vec3, mode: Transport) -> (Rgb, f32) {
         match self {
             Self::Surface(shading) => shading.eval_pdf(wi, mode),

@@ -6,6 +6,7 @@ use super::vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};
 use super::{Counters, roulette};
 use crate::bsdf::{DirectionSample, ShadingPoint, Transport};
 use crate::camera::Camera;
+use crate::geometry::Interaction;
 use crate::light::LightSelector;
 use crate::math::{Anchor, Ray, Vec2, Vec3};
 use crate::sampling::Sampler;
@@ -92,9 +93,7 @@ impl Tracer<'_> {
             // Find the next surface, or the point of a medium that scatters.
             let edges = path.vertices.len() as u32;
             sampler.start_vertex(edges);
-            let Some(vertex) = self.arrive(path, sampler, &mut head, mode) else { return };
-            path.vertices.push(vertex);
-            if path.vertices.len() >= limit {
+            if !self.arrive(path, sampler, &mut head, mode) || path.vertices.len() >= limit {
                 return;
             }
 
@@ -112,54 +111,77 @@ impl Tracer<'_> {
         }
     }
 
-    /// Follows the walk's ray to its next vertex, or notes that it left the scene.
+    /// Follows the walk's ray to its next vertex, or notes that it left the scene; whether there is one.
     #[inline]
-    fn arrive(
-        &mut self,
-        path: &mut Subpath,
-        sampler: &mut impl Sampler,
-        head: &mut Head,
-        mode: Transport,
-    ) -> Option<Vertex> {
-        let scene = self.scene;
-        let (event, tau) = if scene.features.has_media() {
-            let flight = scene.fly(&head.ray, head.around, sampler.next_1d(), &mut self.counters.rays);
-            head.beta *= flight.weight;
-            head.around = flight.around;
-            (flight.event, flight.tau)
-        } else {
-            self.counters.rays += 1;
-            let hit = scene.accel.intersect(&head.ray);
-            let event = hit.map_or(Event::Escaped, |h| Event::Surface(scene.geometry.interaction(&head.ray, &h)));
-            (event, Rgb::ZERO)
+    fn arrive(&mut self, path: &mut Subpath, sampler: &mut impl Sampler, head: &mut Head, mode: Transport) -> bool {
+        if self.scene.features.has_media() {
+            return self.arrive_through_media(path, sampler.next_1d(), head, mode);
+        }
+        self.counters.rays += 1;
+        let Some(hit) = self.scene.accel.intersect(&head.ray) else {
+            path.escape = Some(Escape { w: head.ray.d, beta: head.beta, pdf: head.pdf, tau: Rgb::ZERO });
+            return false;
         };
-        let wo = -head.ray.d;
-        let mut vertex = match &event {
+        let hit = self.scene.geometry.interaction(&head.ray, &hit);
+        let edge = self.edge_to(path, &hit.anchor(), &head.ray);
+        self.meet(path, &hit, edge, head, mode);
+        true
+    }
+
+    /// The same where there are media: `u` samples how far the flight comes. Apart, so that it costs nothing where there are none.
+    #[inline(never)]
+    fn arrive_through_media(&mut self, path: &mut Subpath, u: f32, head: &mut Head, mode: Transport) -> bool {
+        let flight = self.scene.fly(&head.ray, head.around, u, &mut self.counters.rays);
+        head.beta *= flight.weight;
+        head.around = flight.around;
+        let from = path.vertices.last().and_then(Vertex::medium).copied();
+        match &flight.event {
             Event::Escaped => {
-                path.escape = Some(Escape { w: head.ray.d, beta: head.beta, pdf: head.pdf, tau });
-                return None;
+                path.escape = Some(Escape { w: head.ray.d, beta: head.beta, pdf: head.pdf, tau: flight.tau });
+                return false;
             }
             Event::Scatter { p, medium } => {
-                let point = MediumPoint { medium: scene.media[medium.0 as usize], wo };
-                Vertex::first(VertexKind::Medium(point), Anchor::free(*p), 0.0)
+                let medium = self.scene.media[medium.0 as usize];
+                let anchor = Anchor::free(*p);
+                let edge = self.edge_to(path, &anchor, &head.ray).through(flight.tau, from.as_ref(), Some(&medium));
+                let kind = VertexKind::Medium(MediumPoint { medium, wo: -head.ray.d });
+                let (beta, around) = (head.beta, head.around);
+                let first = Vertex::first(kind, anchor, head.pdf * edge.forward);
+                path.vertices.push(Vertex { beta, around, edge, ..first });
             }
             Event::Surface(hit) => {
-                let info = &scene.objects[hit.object.0 as usize];
-                let shading = ShadingPoint::new(&scene.materials, &scene.textures, info.material, hit, wo);
-                let mut vertex = Vertex::first(VertexKind::Surface(shading), hit.anchor(), 0.0);
-                vertex.object = Some(hit.object);
-                if let (Transport::Radiance, Some(index)) = (mode, info.light) {
-                    let radiance = scene.lights[index as usize].radiance(&scene.light_context(), hit, wo);
-                    vertex.emitted = Some((index, radiance));
-                }
-                vertex
+                let edge = self.edge_to(path, &hit.anchor(), &head.ray).through(flight.tau, from.as_ref(), None);
+                self.meet(path, hit, edge, head, mode);
             }
+        }
+        true
+    }
+
+    /// Adds the vertex where the walk meets a surface.
+    #[inline]
+    fn meet(&self, path: &mut Subpath, hit: &Interaction, edge: Edge, head: &Head, mode: Transport) {
+        let scene = self.scene;
+        let wo = -head.ray.d;
+        let info = &scene.objects[hit.object.0 as usize];
+        let shading = ShadingPoint::new(&scene.materials, &scene.textures, info.material, hit, wo);
+        let emitted = match (mode, info.light) {
+            (Transport::Radiance, Some(index)) => {
+                Some((index, scene.lights[index as usize].radiance(&scene.light_context(), hit, wo)))
+            }
+            _ => None,
         };
-        vertex.beta = head.beta;
-        vertex.around = head.around;
-        vertex.edge = self.edge_to(path, &vertex, &head.ray, tau);
-        vertex.pdf_fwd = head.pdf * vertex.edge.forward;
-        Some(vertex)
+        path.vertices.push(Vertex {
+            kind: VertexKind::Surface(shading),
+            anchor: hit.anchor(),
+            beta: head.beta,
+            pdf_fwd: head.pdf * edge.forward,
+            edge,
+            delta: false,
+            tail: 0.0,
+            around: head.around,
+            object: Some(hit.object),
+            emitted,
+        });
     }
 
     /// The walk leaves its last vertex in a direction drawn there. The index of refraction ahead over that behind, which radiance is
@@ -192,24 +214,24 @@ impl Tracer<'_> {
         Some(if mode == Transport::Radiance { s.eta } else { 1.0 })
     }
 
-    /// The edge from the last vertex to `to`, along `ray`, through scattering media of optical depth `tau`.
+    /// The edge from the last vertex to `to`, along `ray`, without what media do to its densities.
     #[inline]
-    fn edge_to(&self, path: &mut Subpath, to: &Vertex, ray: &Ray, tau: Rgb) -> Edge {
+    fn edge_to(&self, path: &mut Subpath, to: &Anchor, ray: &Ray) -> Edge {
         let from = &path.vertices[path.vertices.len() - 1];
-        let edge = match path.light {
-            Some(light) if light.flags.infinite && path.vertices.len() == 1 => Edge::from_infinity(&to.anchor, ray.d),
-            _ => Edge::between(&from.anchor, &to.anchor, ray.d),
+        let Some(light) = path.light.as_mut().filter(|_| path.vertices.len() == 1) else {
+            return Edge::between(&from.anchor, to, ray.d);
         };
+        if light.flags.infinite {
+            return Edge::from_infinity(to, ray.d);
+        }
+        let edge = Edge::between(&from.anchor, to, ray.d);
         // How likely the light's point is when it is sampled from here.
-        if let Some(light) = path.light.as_mut().filter(|_| path.vertices.len() == 1)
-            && !light.flags.infinite
-            && !light.flags.is_delta()
-        {
+        if !light.flags.is_delta() {
             let pdf = self.selector.pmf(light.index)
-                * self.scene.lights[light.index].pdf_li(&self.scene.light_context(), to.anchor.p, &from.anchor);
+                * self.scene.lights[light.index].pdf_li(&self.scene.light_context(), to.p, &from.anchor);
             light.direct = f64::from(pdf) * edge.backward / from.pdf_fwd;
         }
-        if self.scene.features.has_media() { edge.through(tau, from.medium(), to.medium()) } else { edge }
+        edge
     }
 
     /// The walk leaves its last vertex by `s`: now the way back from here to the vertex before is known.
