@@ -71,7 +71,6 @@ fn time(
 ) -> Result<Row, String> {
     let options = RenderOptions { size: Some((args.side, args.side)), ..RenderOptions::counting(integrator, args.spp) };
     let settings = RenderSettings::resolve(&options, &scene.defaults).map_err(|e| e.to_string())?;
-    settings.integrator.check(scene)?;
     let mut seconds = Vec::new();
     let mut image = None;
     for _ in 0..args.runs.max(1) {

@@ -93,7 +93,6 @@ impl Task<'_> {
             ..RenderOptions::counting(self.kind, spp)
         };
         let mut settings = RenderSettings::resolve(&options, &self.scene.defaults).map_err(|e| e.to_string())?;
-        self.kind.check(self.scene)?;
         if self.kind != IntegratorKind::Path {
             // The errors of splatted areas have no more degrees of freedom than there are groups.
             settings.replicates = settings.replicates.max(SPLAT_GROUPS);

@@ -160,8 +160,7 @@ fn settings(args: &Args, plan: &Plan, variant: &Variant, scene: &Scene) -> Resul
     let spp = args.spp.or(if args.time.is_none() { Some(64) } else { None });
     let mut options = variant.render_options(Budget { spp, mpp: None, time_s: args.time })?;
     (options.size, options.max_depth, options.seed) = (plan.size, plan.max_depth, Some(args.seed));
-    let settings = RenderSettings::resolve(&options, &scene.defaults).map_err(|e| format!("{}: {e}", variant.name))?;
-    settings.integrator.check(scene).map(|()| settings)
+    RenderSettings::resolve(&options, &scene.defaults).map_err(|e| format!("{}: {e}", variant.name))
 }
 
 /// Which renders are in the pool, and what to call it.

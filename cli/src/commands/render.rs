@@ -44,7 +44,6 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     pictures.check()?;
     let loaded = scene_file::load(&args.scene, console)?;
     let settings = args.render.resolve(&loaded.scene.defaults)?;
-    settings.integrator.check(&loaded.scene).map_err(|e| Failure::Input(format!("error: {e}")))?;
     let (manifest, _) = loaded.files.into_bundle(loaded.root);
     let options = LocalOptions { threads: args.threads.count() };
     if let Some(folder) = &args.strategies {

@@ -45,7 +45,6 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     let farm = Farm::open(&args.farm)?;
     let loaded = scene_file::load(&args.scene, console)?;
     let settings = args.render.resolve(&loaded.scene.defaults)?;
-    settings.integrator.check(&loaded.scene).map_err(|e| Failure::Input(format!("error: {e}")))?;
     let lights = u32::try_from(loaded.scene.light_count()).unwrap_or(u32::MAX);
     drop(loaded.scene);
     let (manifest, blobs) = loaded.files.into_bundle(loaded.root);

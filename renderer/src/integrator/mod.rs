@@ -10,7 +10,6 @@ mod tile;
 
 pub use context::{Carried, UnitContext, View};
 
-use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
 macro_rules! integrators {
@@ -49,21 +48,6 @@ impl IntegratorKind {
     pub fn sample_name(self) -> &'static str {
         if self == Self::Mmlt { "samples and mutations" } else { "samples" }
     }
-
-    /// Whether it can render the scene, or what it lacks.
-    pub fn check(self, scene: &Scene) -> Result<(), String> {
-        if scene.features.has_media() && !Self::WITH_MEDIA.contains(&self) {
-            let able = Self::WITH_MEDIA.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ");
-            return Err(format!(
-                "the integrator {} does not render participating media or null surfaces yet, which the scene has; these do: {able}",
-                self.name()
-            ));
-        }
-        Ok(())
-    }
-
-    /// Those that follow light through media.
-    const WITH_MEDIA: &[Self] = &[Self::Light, Self::Bdpt];
 }
 
 impl std::str::FromStr for IntegratorKind {

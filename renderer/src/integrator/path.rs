@@ -1,21 +1,40 @@
 //! Unidirectional path tracing: next-event estimation and BSDF sampling, combined by multiple importance sampling
 //! (Kajiya 1986; Veach 1997, chapter 9).
 
+mod vertex;
+
 use super::{UnitContext, tile};
-use crate::bsdf::{ShadingPoint, Transport};
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::Interaction;
+use crate::light::LiSample;
 use crate::math::{Ray, Vec3};
+use crate::medium::{Channels, passing_probability};
 use crate::path::{power_heuristic, roulette};
 use crate::sampling::Sampler;
+use crate::scene::{Enclosures, Event, Target};
 use crate::spectrum::Rgb;
 use std::ops::Range;
+use vertex::Vertex;
 
 /// Renders samples `samples` of each pixel of a tile; `None` when stopped.
 pub fn render_tile(c: &UnitContext<'_>, rect: Rect, samples: Range<u32>, counters: &mut Counters) -> Option<TileSums> {
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
+    // Which of the two it is is decided once for the tile: scenes without media run no code for them.
+    if c.scene.features.has_media() {
+        render::<true>(c, rect, samples, counters)
+    } else {
+        render::<false>(c, rect, samples, counters)
+    }
+}
+
+fn render<const MEDIA: bool>(
+    c: &UnitContext<'_>,
+    rect: Rect,
+    samples: Range<u32>,
+    counters: &mut Counters,
+) -> Option<TileSums> {
     tile::render(c, rect, samples, |s| {
-        Walk { c, counters: &mut *counters, sampler: s.sampler, aov: s.aov }.radiance(s.ray)
+        Walk::<_, MEDIA> { c, counters: &mut *counters, sampler: s.sampler, aov: s.aov }.radiance(s.ray)
     })
 }
 
@@ -24,21 +43,29 @@ pub fn render_tile(c: &UnitContext<'_>, rect: Rect, samples: Range<u32>, counter
 struct Arrival {
     /// The vertex before.
     p: Vec3,
-    /// Density per solid angle of the direction taken there.
+    /// Density per solid angle of the direction taken there, times the probability of coming through the media since.
     pdf: f32,
     /// Whether next-event estimation could not have found the same light: the camera, or a delta lobe.
     alone: bool,
 }
 
-/// One path.
-struct Walk<'a, 'b, S> {
+/// A flight before it is made.
+struct Leg {
+    ray: Ray,
+    /// What encloses the ray's origin; after the flight, its end.
+    around: Enclosures,
+    arrival: Arrival,
+}
+
+/// One path, through media or not.
+struct Walk<'a, 'b, S, const MEDIA: bool> {
     c: &'a UnitContext<'a>,
     counters: &'b mut Counters,
     sampler: S,
     aov: Option<&'b mut Aov>,
 }
 
-impl<S: Sampler> Walk<'_, '_, S> {
+impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
     /// Radiance that arrives along a camera ray.
     fn radiance(&mut self, camera_ray: Ray) -> Rgb {
         let scene = self.c.scene;
@@ -46,59 +73,95 @@ impl<S: Sampler> Walk<'_, '_, S> {
         let mut beta = Rgb::ONE;
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
-        let mut ray = camera_ray;
-        let mut arrival = Arrival { p: ray.o, pdf: 0.0, alone: true };
+        let arrival = Arrival { p: camera_ray.o, pdf: 0.0, alone: true };
+        let mut leg = Leg { ray: camera_ray, around: scene.camera_enclosures, arrival };
         let mut edges = 0;
         while edges < self.c.max_depth {
             edges += 1;
             self.sampler.start_vertex(edges);
-            self.counters.rays += 1;
-            let Some(hit) = scene.accel.intersect(&ray) else {
-                if self.c.carried.has(edges) {
-                    self.add(&mut total, beta, self.escaped(&ray, &arrival));
-                }
-                break;
-            };
-            let hit = scene.geometry.interaction(&ray, &hit);
-            let wo = -ray.d;
-            if self.c.carried.has(edges) {
-                self.add(&mut total, beta, self.emitted(&hit, wo, &arrival));
-            }
-            let material = scene.objects[hit.object.0 as usize].material;
-            let shading = ShadingPoint::new(&scene.materials, &scene.textures, material, &hit, wo);
-            if edges == 1 {
-                self.first_hit(&camera_ray, &hit, &shading);
+            let event = self.fly(&mut leg, &mut beta);
+            let Some(here) = self.arrive(&event, &leg, beta, edges, &mut total) else { break };
+            if let (1, Some(aov)) = (edges, self.aov.as_deref_mut()) {
+                aov.add(&here.aov(camera_ray.o));
             }
             if edges == self.c.max_depth {
                 break;
             }
 
             // Connect to a light.
-            if !shading.is_delta_only() && self.c.carried.has(edges + 1) {
-                let direct = self.next_event(&hit, &shading);
+            if !here.is_delta_only() && self.c.carried.has(edges + 1) {
+                let direct = self.next_event(&here, &leg.around);
                 self.add(&mut total, beta, direct);
             }
 
-            // Go on in a direction drawn from the BSDF.
+            // Go on in a direction drawn from the BSDF or the phase function.
             let uc = self.sampler.next_1d();
             let u = self.sampler.next_2d();
-            let Some(s) = shading.sample(uc, u, Transport::Radiance) else { break };
-            beta *= s.weight();
+            let Some(s) = here.sample(uc, u) else { break };
+            beta *= s.weight;
             if beta.is_black() || !beta.is_valid() {
                 self.counters.admit(beta);
                 break;
             }
             eta_scale *= s.eta * s.eta;
-            ray = hit.spawn_ray(s.wi);
-            arrival = Arrival { p: hit.p, pdf: s.pdf, alone: s.lobe.delta };
+            let anchor = here.anchor();
+            leg.ray = here.ray(s.wi);
+            leg.arrival = Arrival { p: anchor.p, pdf: s.pdf, alone: s.delta };
+            if MEDIA {
+                leg.around = here.around(scene, s.wi, &leg.around);
+            }
 
             // End the path by chance when it carries little.
             if edges >= self.c.rr_depth {
-                let Some(factor) = roulette(beta * eta_scale, self.sampler.next_1d()) else { break };
+                let u = self.sampler.next_1d();
+                let factor = match here {
+                    Vertex::Surface { .. } => roulette(beta * eta_scale, u),
+                    Vertex::Medium { .. } => roulette_in_medium(beta * eta_scale, u),
+                };
+                let Some(factor) = factor else { break };
                 beta *= factor;
             }
         }
         total
+    }
+
+    /// Goes on to what the ray meets.
+    #[inline]
+    fn fly(&mut self, leg: &mut Leg, beta: &mut Rgb) -> Event {
+        let scene = self.c.scene;
+        if !MEDIA {
+            self.counters.rays += 1;
+            let hit = scene.accel.intersect(&leg.ray);
+            return hit.map_or(Event::Escaped, |hit| Event::Surface(scene.geometry.interaction(&leg.ray, &hit)));
+        }
+        let u = self.sampler.next_1d();
+        let flight = scene.fly_by(&Channels::by_throughput(*beta), &leg.ray, leg.around, u, &mut self.counters.rays);
+        *beta *= flight.weight;
+        leg.around = flight.around;
+        leg.arrival.pdf *= passing_probability(flight.tau);
+        flight.event
+    }
+
+    /// Adds the light that is met there; what scatters the path, if it may go on.
+    #[inline]
+    fn arrive(&mut self, event: &Event, leg: &Leg, beta: Rgb, edges: u32, total: &mut Rgb) -> Option<Vertex<'a>> {
+        let scene = self.c.scene;
+        let wo = -leg.ray.d;
+        match event {
+            Event::Escaped => {
+                if self.c.carried.has(edges) {
+                    self.add(total, beta, self.escaped(&leg.ray, &leg.arrival));
+                }
+                None
+            }
+            Event::Surface(hit) => {
+                if self.c.carried.has(edges) {
+                    self.add(total, beta, self.emitted(hit, wo, &leg.arrival));
+                }
+                Some(Vertex::surface(scene, *hit, wo))
+            }
+            Event::Scatter { p, medium } => Some(Vertex::Medium { p: *p, wo, medium: &scene.media[medium.0 as usize] }),
+        }
     }
 
     /// Adds a contribution unless it is not a number or negative, which is counted.
@@ -141,36 +204,49 @@ impl<S: Sampler> Walk<'_, '_, S> {
     }
 
     /// Light that comes straight from a chosen light.
-    fn next_event(&mut self, hit: &Interaction, shading: &ShadingPoint) -> Rgb {
+    fn next_event(&mut self, here: &Vertex, around: &Enclosures) -> Rgb {
         let scene = self.c.scene;
         let uc = self.sampler.next_1d();
         let u = self.sampler.next_2d();
         let Some(choice) = self.c.selector.sample(uc) else { return Rgb::ZERO };
         let light = &scene.lights[choice.index];
-        let Some(li) = light.sample_li(&scene.light_context(), hit.p, choice.u, u) else { return Rgb::ZERO };
-        let (f, pdf_bsdf) = shading.eval_pdf(li.wi, Transport::Radiance);
-        if f.is_black() {
+        let from = here.anchor();
+        let Some(li) = light.sample_li(&scene.light_context(), from.p, choice.u, u) else { return Rgb::ZERO };
+        let s = here.eval(li.wi);
+        if s.f.is_black() {
             return Rgb::ZERO;
         }
         let pdf = li.pdf * choice.pmf;
-        let weight = if li.delta { 1.0 } else { power_heuristic(pdf, pdf_bsdf) };
-        let contribution = f * li.radiance * (shading.abs_cos(li.wi) * weight / pdf);
+        let weighted = |pdf_scattering: f32| {
+            let weight = if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
+            s.f * li.radiance * (s.cos * weight / pdf)
+        };
+        if MEDIA {
+            let around = here.around(scene, li.wi, around);
+            let target = target(&li);
+            let Some(through) = scene.transmission(&from, &target, around, &mut self.counters.rays) else {
+                return Rgb::ZERO;
+            };
+            return weighted(s.pdf * passing_probability(through.tau)) * through.transmittance;
+        }
+        let contribution = weighted(s.pdf);
         if contribution.is_black() {
             return Rgb::ZERO;
         }
         self.counters.rays += 1;
-        if scene.accel.occluded(&li.shadow_ray(&hit.anchor())) { Rgb::ZERO } else { contribution }
+        if scene.accel.occluded(&li.shadow_ray(&from)) { Rgb::ZERO } else { contribution }
     }
+}
 
-    /// What the first surface is, for the auxiliary images.
-    fn first_hit(&mut self, ray: &Ray, hit: &Interaction, shading: &ShadingPoint) {
-        if let Some(aov) = self.aov.as_deref_mut() {
-            aov.add(&Aov {
-                albedo: shading.bsdf.albedo().to_array(),
-                normal: shading.frame.n.to_array(),
-                depth: (hit.p - ray.o).length(),
-                hits: 1.0,
-            });
-        }
-    }
+/// Where the shadow ray of a sample ends.
+fn target(li: &LiSample) -> Target {
+    if li.dist.is_infinite() { Target::Direction(li.wi) } else { Target::Point(li.light) }
+}
+
+/// Russian roulette in a medium. Where little is absorbed paths are long by nature: as many as the square of the optical thickness.
+/// Surfaces end one in twenty at each vertex, whatever it carries; here the few that came far would carry all of the light.
+#[inline]
+fn roulette_in_medium(throughput: Rgb, u: f32) -> Option<f32> {
+    let q = throughput.max_component().min(0.9999);
+    (u < q).then(|| 1.0 / q)
 }

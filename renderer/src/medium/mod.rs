@@ -1,8 +1,8 @@
 //! Homogeneous participating media: how far light flies in them, and how it scatters there. The contract:
 //!
 //! * A straight flight may cross several media; along it the optical depth `tau` of each colour channel adds up. What is sampled is a
-//!   depth in one channel; the channels are chosen alike, and the densities are means over them, so that every channel is
-//!   estimated with every sample (one-sample multiple importance sampling; Veach 1997, section 9.2.4).
+//!   depth in one channel, chosen by [`Channels`], and the densities are means over them, so that every channel is estimated with
+//!   every sample (one-sample multiple importance sampling; Veach 1997, section 9.2.4).
 //! * Light is never absorbed by chance: what is lost is in the weight, `albedo` at each scattering.
 //! * A medium that scatters no channel is not sampled at all: it only attenuates, and its depth is in no density.
 //! * Weights are formed as ratios of exponentials, so that they are right where the exponentials themselves underflow; in a grey
@@ -102,18 +102,17 @@ impl Medium {
     }
 
     /// Density per unit of length of a scattering at optical depth `tau` (of scattering media, from the start of the flight to a
-    /// point in this one).
+    /// point in this one), channels chosen alike.
     #[inline]
     pub fn scatter_density(&self, tau: Rgb) -> f32 {
-        mean(self.sigma_t * transmittance(tau))
+        Channels::ALIKE.mean(self.sigma_t * transmittance(tau))
     }
 
     /// What a path's throughput is multiplied by when it scatters at optical depth `tau`: `sigma_s T / density`.
     #[inline]
-    pub fn scatter_weight(&self, tau: Rgb) -> Rgb {
-        let e = relative_transmittance(tau);
-        let weighted = self.sigma_t * e;
-        self.albedo * (weighted / mean(weighted))
+    pub fn scatter_weight(&self, tau: Rgb, channels: &Channels) -> Rgb {
+        let weighted = self.sigma_t * relative_transmittance(tau);
+        self.albedo * (weighted / channels.mean(weighted))
     }
 }
 
@@ -123,21 +122,21 @@ pub fn transmittance(tau: Rgb) -> Rgb {
     if tau.r == tau.g && tau.g == tau.b { Rgb::splat(exp(-tau.r)) } else { tau.map(|t| exp(-t)) }
 }
 
-/// Probability that a sampled flight passes scattering media of optical depth `tau`.
+/// Probability that a sampled flight passes scattering media of optical depth `tau`, channels chosen alike.
 #[inline]
 pub fn passing_probability(tau: Rgb) -> f32 {
-    mean(transmittance(tau))
+    Channels::ALIKE.mean(transmittance(tau))
 }
 
 /// What a path's throughput is multiplied by when its flight has passed scattering media of optical depth `tau`: the
 /// transmittance over the probability.
 #[inline]
-pub fn passing_weight(tau: Rgb) -> Rgb {
+pub fn passing_weight(tau: Rgb, channels: &Channels) -> Rgb {
     if tau.r == tau.g && tau.g == tau.b {
         return Rgb::ONE;
     }
     let e = relative_transmittance(tau);
-    e / mean(e)
+    e / channels.mean(e)
 }
 
 /// `exp(-tau)` over its largest component, which may underflow itself.
@@ -147,10 +146,42 @@ fn relative_transmittance(tau: Rgb) -> Rgb {
     tau.map(|t| if t > least { exp(least - t) } else { 1.0 })
 }
 
-/// Mean over the channels; of three equal numbers exactly that number.
-#[inline]
-fn mean(v: Rgb) -> f32 {
-    v.r + ((v.g - v.r) + (v.b - v.r)) / 3.0
+/// With which probabilities a flight takes its optical depth from a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channels(Rgb);
+
+impl Channels {
+    /// All alike.
+    pub const ALIKE: Self = Self(Rgb::splat(1.0 / 3.0));
+
+    /// In proportion to what a path carries in each. Where nothing is absorbed the sum over the channels then stays what it is,
+    /// however often the path scatters, as if one channel were chosen for the whole path and the densities of all three combined
+    /// (Wilkie et al. 2014, "Hero Wavelength Spectral Sampling"); chosen alike at each flight, weights would grow with every one.
+    #[inline]
+    pub fn by_throughput(beta: Rgb) -> Self {
+        let scale = 1.0 / (beta.r + beta.g + beta.b);
+        if scale.is_finite() && scale > 0.0 { Self(beta * scale) } else { Self::ALIKE }
+    }
+
+    /// Mean over the channels; of three equal numbers exactly that number.
+    #[inline]
+    fn mean(&self, v: Rgb) -> f32 {
+        if v.r == v.g && v.g == v.b { v.r } else { self.0.r * v.r + self.0.g * v.g + self.0.b * v.b }
+    }
+
+    /// The channel that `u` chooses, and what is left of `u`, again uniform in [0, 1).
+    #[inline]
+    fn choose(&self, u: f32) -> (usize, f32) {
+        let Rgb { r, g, b } = self.0;
+        let (channel, low, p) = if u < r {
+            (0, 0.0, r)
+        } else if u < r + g || b == 0.0 {
+            (1, r, g)
+        } else {
+            (2, r + g, b)
+        };
+        (channel, ((u - low) / p).clamp(0.0, ONE_MINUS_EPSILON))
+    }
 }
 
 /// How far a flight goes: an optical depth in one channel, drawn with one number.
@@ -163,22 +194,13 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// A flight that nothing scatters.
-    pub const UNLIMITED: Self = Self { channel: 0, tau: f32::INFINITY };
-
-    /// The reach for `u` in [0, 1); `chromatic` where a medium of the scene is.
+    /// The reach for `u` in [0, 1); `channels` where a medium of the scene is chromatic.
     ///
     /// Primary numbers have steps of 2^-24; half a step is added, so that thin media scatter as often as they should on average
     /// and no depth is 0.
     #[inline]
-    pub fn new(u: f32, chromatic: bool) -> Self {
-        let (channel, u) = if chromatic {
-            let scaled = 3.0 * u;
-            let channel = scaled.min(2.0).floor();
-            (channel as usize, scaled - channel)
-        } else {
-            (0, u)
-        };
+    pub fn new(u: f32, channels: Option<&Channels>) -> Self {
+        let (channel, u) = channels.map_or((0, u), |c| c.choose(u));
         let u = (u + 0.25 * f32::EPSILON).min(ONE_MINUS_EPSILON);
         Self { channel, tau: -ln_1p(-u) }
     }

@@ -30,21 +30,23 @@ fn weighted_flights_estimate_the_transport_equation_in_every_channel() {
         [([0.4, 0.4, 0.4], 1.0), ([0.1, 1.0, 3.0], 1.5), ([0.0, 0.5, 2.0], 2.0), ([1e-3, 1e-3, 2.0], 3.0)]
     {
         let m = medium(sigma_t, [0.9, 0.5, 1.0]);
-        let passed = mean_over_u(|u| {
-            let passes = Reach::new(u, true).distance(&m) >= length;
-            if passes { passing_weight(m.tau(length)) } else { Rgb::ZERO }
-        });
-        let scattered = mean_over_u(|u| {
-            let t = Reach::new(u, true).distance(&m);
-            if t < length { m.scatter_weight(m.tau(t)) * t } else { Rgb::ZERO }
-        });
-        for c in 0..3 {
-            let (s, l) = (f64::from(m.sigma_t[c]), f64::from(length));
-            let transmittance = exp64(-s * l);
-            assert!((passed[c] - transmittance).abs() < 2e-5, "{sigma_t:?} {c}: {} {transmittance}", passed[c]);
-            let moment = if s > 0.0 { (1.0 - transmittance * (1.0 + s * l)) / s } else { 0.0 };
-            let moment = f64::from(m.albedo[c]) * moment;
-            assert!((scattered[c] - moment).abs() < 5e-5, "{sigma_t:?} {c}: {} {moment}", scattered[c]);
+        for channels in [Channels::ALIKE, Channels::by_throughput(Rgb::new(0.2, 3.0, 0.7))] {
+            let passed = mean_over_u(|u| {
+                let passes = Reach::new(u, Some(&channels)).distance(&m) >= length;
+                if passes { passing_weight(m.tau(length), &channels) } else { Rgb::ZERO }
+            });
+            let scattered = mean_over_u(|u| {
+                let t = Reach::new(u, Some(&channels)).distance(&m);
+                if t < length { m.scatter_weight(m.tau(t), &channels) * t } else { Rgb::ZERO }
+            });
+            for c in 0..3 {
+                let (s, l) = (f64::from(m.sigma_t[c]), f64::from(length));
+                let transmittance = exp64(-s * l);
+                assert!((passed[c] - transmittance).abs() < 2e-5, "{sigma_t:?} {c}: {} {transmittance}", passed[c]);
+                let moment = if s > 0.0 { (1.0 - transmittance * (1.0 + s * l)) / s } else { 0.0 };
+                let moment = f64::from(m.albedo[c]) * moment;
+                assert!((scattered[c] - moment).abs() < 5e-5, "{sigma_t:?} {c}: {} {moment}", scattered[c]);
+            }
         }
     }
 }
@@ -54,8 +56,8 @@ fn grey_media_have_exact_weights_at_any_depth() {
     for sigma in [1.3e-30f32, 7e-20, 3.3e-10, 1e-6, 0.017, 0.3, 1.0, 1.7, 19.0, 1e3, 7e6, 3e12, 9e23, MAX_SIGMA] {
         let m = Medium::new(Rgb::splat(sigma), Rgb::new(0.9, 0.3, 1.0), Phase::Isotropic).unwrap();
         for t in [0.0, 1e-20, 1e-3, 1.0, 1e6] {
-            assert_eq!(passing_weight(m.tau(t)), Rgb::ONE);
-            assert_eq!(m.scatter_weight(m.tau(t)), m.albedo, "sigma {sigma}, t {t}");
+            assert_eq!(passing_weight(m.tau(t), &Channels::ALIKE), Rgb::ONE);
+            assert_eq!(m.scatter_weight(m.tau(t), &Channels::ALIKE), m.albedo, "sigma {sigma}, t {t}");
         }
     }
 }
@@ -63,26 +65,30 @@ fn grey_media_have_exact_weights_at_any_depth() {
 #[test]
 fn chromatic_weights_survive_where_the_transmittance_underflows() {
     let m = medium([50.0, 200.0, 1e9], [1.0; 3]);
-    let w = passing_weight(m.tau(3.0));
+    let w = passing_weight(m.tau(3.0), &Channels::ALIKE);
     assert!((w.r - 3.0).abs() < 1e-5 && w.g == 0.0 && w.b == 0.0, "{w:?}");
-    let w = m.scatter_weight(m.tau(3.0));
+    let w = m.scatter_weight(m.tau(3.0), &Channels::ALIKE);
     assert!((w.r - 3.0).abs() < 1e-5 && w.is_valid(), "{w:?}");
     assert_eq!(passing_probability(m.tau(f32::INFINITY)), 0.0);
     // A channel without extinction is not scattered, wherever the others are.
     let clear = medium([0.0, 1.0, 1.0], [1.0; 3]);
-    let w = clear.scatter_weight(clear.tau(40.0));
+    let w = clear.scatter_weight(clear.tau(40.0), &Channels::ALIKE);
     assert!(w.r == 0.0 && w.is_valid(), "{w:?}");
     assert_eq!(clear.tau(f32::INFINITY).r, 0.0);
 }
 
 #[test]
 fn reaches_are_never_zero_and_end() {
-    for u in [0.0, f32::MIN_POSITIVE, 0.33333334, 0.5, 0.6666667, ONE_MINUS_EPSILON] {
-        for chromatic in [false, true] {
-            let reach = Reach::new(u, chromatic);
+    let uneven = Channels::by_throughput(Rgb::new(0.0, 0.3, 0.1));
+    for u in [0.0, f32::MIN_POSITIVE, 0.33333334, 0.5, 0.6666667, 0.75, ONE_MINUS_EPSILON] {
+        for channels in [None, Some(&Channels::ALIKE), Some(&uneven), Some(&Channels::by_throughput(Rgb::ZERO))] {
+            let reach = Reach::new(u, channels);
             assert!(reach.tau > 0.0 && reach.tau < 17.0 && reach.channel < 3, "{u}: {reach:?}");
+            assert!(channels != Some(&uneven) || reach.channel > 0, "{u}: {reach:?}");
         }
     }
+    let only_green = Channels::by_throughput(Rgb::new(0.0, 1e-30, 0.0));
+    assert_eq!([0.0, 0.3, ONE_MINUS_EPSILON].map(|u| Reach::new(u, Some(&only_green)).channel), [1; 3]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::geometry::Interaction;
 use crate::light::LiSample;
 use crate::math::rounding::{gamma, offset_ray_origin};
 use crate::math::{Anchor, Ray, Vec3};
-use crate::medium::{Medium, MediumId, Reach, passing_weight, transmittance};
+use crate::medium::{Channels, Medium, MediumId, Reach, passing_weight, transmittance};
 use crate::spectrum::Rgb;
 
 /// A flight through more surfaces than this comes to nothing: coincident surfaces might hold it for ever.
@@ -94,7 +94,13 @@ impl Scene {
     /// Follows a ray (of unit direction) from a point inside `around` to what it meets; `u` in [0, 1) samples how far it comes.
     /// `rays` counts the rays that are cast.
     pub fn fly(&self, ray: &Ray, around: Enclosures, u: f32, rays: &mut u64) -> Flight {
-        let mut reach = Reach::new(u, self.features.chromatic_media);
+        self.fly_by(&Channels::ALIKE, ray, around, u, rays)
+    }
+
+    /// The same with channels chosen otherwise, which the weight takes into account; densities that follow from `tau` are still
+    /// those of channels chosen alike, and serve as such in weights of multiple importance sampling.
+    pub fn fly_by(&self, channels: &Channels, ray: &Ray, around: Enclosures, u: f32, rays: &mut u64) -> Flight {
+        let mut reach = Reach::new(u, self.features.chromatic_media.then_some(channels));
         let (mut ray, mut around) = (*ray, around);
         let mut depth = Depth::default();
         for _ in 0..MOST_CROSSED {
@@ -114,7 +120,7 @@ impl Scene {
                 };
                 if !self.is_stray(p, &around) {
                     depth.add(m, limit);
-                    let weight = transmittance(depth.absorbing) * m.scatter_weight(depth.scattering);
+                    let weight = transmittance(depth.absorbing) * m.scatter_weight(depth.scattering, channels);
                     return Flight { event: Event::Scatter { p, medium: id }, weight, tau: depth.scattering, around };
                 }
                 around = Enclosures::default();
@@ -129,7 +135,7 @@ impl Scene {
                 if let Some((_, m)) = medium {
                     depth.add(m, f32::INFINITY);
                 }
-                return depth.passed(Event::Escaped, around);
+                return depth.passed(Event::Escaped, around, channels);
             };
             if let Some((_, m)) = medium {
                 depth.add(m, end);
@@ -139,7 +145,7 @@ impl Scene {
                 reach.tau = (reach.tau - m.tau(end)[reach.channel]).max(f32::MIN_POSITIVE);
             }
             match self.passes(surface.object, surface.ng.dot(ray.d) < 0.0, &around) {
-                None => return depth.passed(Event::Surface(surface), around),
+                None => return depth.passed(Event::Surface(surface), around, channels),
                 Some(beyond) => {
                     around = beyond;
                     ray = surface.spawn_ray(ray.d);
@@ -201,8 +207,8 @@ impl Scene {
 impl Depth {
     /// A flight that has passed it all.
     #[inline]
-    fn passed(&self, event: Event, around: Enclosures) -> Flight {
-        let weight = transmittance(self.absorbing) * passing_weight(self.scattering);
+    fn passed(&self, event: Event, around: Enclosures, channels: &Channels) -> Flight {
+        let weight = transmittance(self.absorbing) * passing_weight(self.scattering, channels);
         Flight { event, weight, tau: self.scattering, around }
     }
 }

@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
+mod analytic;
 #[path = "../common/mod.rs"]
 mod common;
 mod flight;
+mod furnace;
+mod layers;
 mod scenes;
