@@ -5,7 +5,7 @@ use super::Sampler;
 use super::rng::{GOLDEN, mix64, unit_f32};
 use crate::math::Vec2;
 
-/// Coordinates of a fixed block that belongs to one vertex of a walk: {lobe, direction, direction, distance}.
+/// Coordinates of a fixed block that belongs to one vertex of a walk: {distance, where there are media; lobe, direction, direction}.
 const VERTEX_BLOCK: usize = 4;
 /// From one vertex of a walk to the next: the walks from camera and light take turns, so that no place depends on their lengths.
 const STRIDE: usize = 2 * VERTEX_BLOCK;

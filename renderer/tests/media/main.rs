@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
 mod analytic;
+mod bidirectional;
 #[path = "../common/mod.rs"]
 mod common;
 mod flight;
