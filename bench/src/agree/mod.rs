@@ -41,7 +41,7 @@ pub struct Args {
 /// How much to render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Budget {
-    /// A minute or so: image means to 2 % and better, those of mmlt to 25 %
+    /// Two minutes or so: image means to 2 % and better, those of mmlt to 25 %
     Quick,
     /// Up to half an hour: image means to 0.3 %
     Full,
