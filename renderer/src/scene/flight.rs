@@ -11,6 +11,8 @@ use crate::spectrum::Rgb;
 
 /// A flight through more surfaces than this comes to nothing: coincident surfaces might hold it for ever.
 const MOST_CROSSED: usize = 4096;
+/// Flatter rays than of this cosine are taken for as flat: the surface may bend away below them.
+const FLATTEST: f32 = 1e-3;
 /// Nothing of a beam is left, in single precision, after this optical depth.
 const OPAQUE: f32 = 104.0;
 
@@ -103,15 +105,20 @@ impl Scene {
         let mut reach = Reach::new(u, self.features.chromatic_media.then_some(channels));
         let (mut ray, mut around) = (*ray, around);
         let mut depth = Depth::default();
+        // What lies between the last surface and the origin that is clear of it. Left out, it would show where light goes unhindered
+        // for less than 1e-4 of the coordinates: a half-space of albedo 0.9 lost 0.3 % of its reflectance there, at 1e-6 14 %.
+        let mut skipped = 0.0;
         for _ in 0..MOST_CROSSED {
             let medium = self.medium_in(&around);
             let scattering = medium.filter(|(_, m)| m.scatters());
-            let limit = scattering.map_or(f32::INFINITY, |(_, m)| reach.distance(m));
+            let whole = scattering.map_or(f32::INFINITY, |(_, m)| reach.distance(m));
+            let limit = (whole - skipped).max(0.0);
             // A little further: a point that rounding would move through a surface must be kept from it.
             ray.t_max = limit + (limit + ray.o.abs().max_element()) * gamma(8);
             *rays += 1;
             let hit = self.accel.intersect(&ray);
             let end = hit.map_or(f32::INFINITY, |h| h.t);
+            let passed = end + skipped;
             let surface = hit.map(|h| self.geometry.interaction(&ray, &h));
             if let (Some((id, m)), true) = (scattering, limit.is_finite() && limit <= end) {
                 let p = match &surface {
@@ -119,7 +126,7 @@ impl Scene {
                     None => ray.at(limit),
                 };
                 if !self.is_stray(p, &around) {
-                    depth.add(m, limit);
+                    depth.add(m, whole);
                     let weight = transmittance(depth.absorbing) * m.scatter_weight(depth.scattering, channels);
                     return Flight { event: Event::Scatter { p, medium: id }, weight, tau: depth.scattering, around };
                 }
@@ -138,17 +145,18 @@ impl Scene {
                 return depth.passed(Event::Escaped, around, channels);
             };
             if let Some((_, m)) = medium {
-                depth.add(m, end);
+                depth.add(m, passed);
             }
             if let Some((_, m)) = scattering {
                 // Not quite to zero, which rounding might do: zero over zero would be no distance.
-                reach.tau = (reach.tau - m.tau(end)[reach.channel]).max(f32::MIN_POSITIVE);
+                reach.tau = (reach.tau - m.tau(passed)[reach.channel]).max(f32::MIN_POSITIVE);
             }
             match self.passes(surface.object, surface.ng.dot(ray.d) < 0.0, &around) {
                 None => return depth.passed(Event::Surface(surface), around, channels),
                 Some(beyond) => {
                     around = beyond;
                     ray = surface.spawn_ray(ray.d);
+                    skipped = skipped_before(&ray, &surface);
                 }
             }
         }
@@ -202,6 +210,13 @@ impl Scene {
         let r = self.bounds.radius * (1.0 + gamma(16));
         !around.is_empty() && (p - self.bounds.centre).length_squared() > r * r
     }
+}
+
+/// How far a ray would have come from the plane of the surface that it leaves to the depth of its origin below.
+#[inline]
+fn skipped_before(ray: &Ray, surface: &Interaction) -> f32 {
+    let cos = ray.d.dot(surface.ng).abs();
+    ((ray.o - surface.p).dot(surface.ng)).abs() / cos.max(FLATTEST)
 }
 
 impl Depth {
