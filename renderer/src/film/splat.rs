@@ -1,3 +1,5 @@
+use super::Filter;
+use crate::math::Vec2;
 use crate::spectrum::Rgb;
 
 /// Side of a splat block in pixels.
@@ -42,6 +44,14 @@ impl SplatSums {
     /// Bytes of memory that the touched blocks take.
     pub fn memory(&self) -> usize {
         size_of_val(&self.data[..])
+    }
+
+    /// Adds `value` at a raster position to all pixels whose filter covers it.
+    #[inline]
+    pub fn splat(&mut self, filter: &Filter, raster: Vec2, value: Rgb) {
+        for (x, y, weight) in filter.weights(raster).iter() {
+            self.add(x, y, value * weight);
+        }
     }
 
     /// Adds `value` to pixel (x, y), which must lie on the film.

@@ -140,11 +140,7 @@ impl Sink for Film<'_> {
     fn add(&mut self, _s: usize, _t: usize, path: &Connection) {
         match path.raster {
             None => self.pixel += path.weighted(),
-            Some(raster) => {
-                for (x, y, weight) in self.c.view.filter.weights(raster).iter() {
-                    self.splats.add(x, y, path.weighted() * weight);
-                }
-            }
+            Some(raster) => self.splats.splat(&self.c.view.filter, raster, path.weighted()),
         }
     }
 }

@@ -222,9 +222,7 @@ impl<'a, 'b> Pool<'a, 'b> {
             (all.technique, all.target) = (s as u32, target);
         }
         if let Some(splats) = self.splats.as_deref_mut() {
-            for (x, y, h) in self.c.view.filter.weights(raster).iter() {
-                splats.add(x, y, value * (h / q));
-            }
+            splats.splat(&self.c.view.filter, raster, value / q);
         }
     }
 }

@@ -180,7 +180,5 @@ fn splat(c: &UnitContext<'_>, splats: &mut SplatSums, path: &Proposal, weight: f
         return;
     }
     let value: Rgb = path.value * weight as f32;
-    for (x, y, h) in c.view.filter.weights(path.raster).iter() {
-        splats.add(x, y, value * h);
-    }
+    splats.splat(&c.view.filter, path.raster, value);
 }

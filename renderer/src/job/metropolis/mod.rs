@@ -10,14 +10,17 @@
 //! `b` and the starts of one chain always come from the same pool, which keeps `b` times the mean splat unbiased whatever the length of
 //! the chains. Their *number* may depend on the pools: systematic resampling gives the same expectation for any number of starts.
 
-use super::bytes::Reader;
-use super::plan::{GroupRange, Part, PassPlan, Sampling, dealt, pass_size};
-use super::settings::RenderSettings;
-use super::unit::{Unit, UnitKind, UnitResult};
+mod learn;
+mod pool;
+mod state;
+
 use crate::film::{GroupFilm, SplatSums};
 use crate::integrator::mmlt::{ChainConstants, ChainStart, Depth, TARGET_CELL};
-use crate::math::pow64;
+use crate::job::plan::{GroupRange, Part, PassPlan, Sampling, dealt, pass_size};
+use crate::job::settings::RenderSettings;
+use crate::job::unit::{Unit, UnitKind, UnitResult};
 use crate::sampling::{IndependentSampler, Sampler};
+use pool::Pool;
 use std::collections::BTreeMap;
 
 /// Names the random starts of a pool among all hashes.
@@ -31,8 +34,6 @@ const MIN_POOL: f64 = 256.0;
 /// Edges of the path of a typical mutation, and up to which walks of a pool's samples typically last.
 const TYPICAL_EDGES: f64 = 5.0;
 const TYPICAL_LONGEST: f64 = 16.0;
-/// Paths of a pool's sample below this share of the mean target are left to chance.
-const THRESHOLD_SHARE: f64 = 0.02;
 /// Samples of the pools of a pass, all groups and lengths together: bounds the coordinator's memory.
 const MAX_POOLS: f64 = (1 << 20) as f64;
 /// Edges of the longest path of chains when the depth is unbounded.
@@ -44,42 +45,6 @@ const FIRST_MUTATIONS: u32 = 16;
 pub fn lengths(settings: &RenderSettings) -> std::ops::RangeInclusive<u32> {
     let longest = settings.mmlt.longest;
     settings.mmlt.direct_edges + 1..=settings.max_depth.map_or(longest.min(LONGEST_UNBOUNDED), |n| n.min(longest))
-}
-
-/// A pool of one replicate and path length.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pool {
-    /// Number of samples.
-    pub samples: u32,
-    /// What they found, by sample: start and weight.
-    pub found: Vec<(ChainStart, f32)>,
-}
-
-impl Pool {
-    /// Mean of the target.
-    fn b(&self) -> f64 {
-        let sum: f64 = self.found.iter().map(|f| f64::from(f.1)).sum();
-        if self.samples == 0 { 0.0 } else { sum / f64::from(self.samples) }
-    }
-
-    /// `n` starts by systematic resampling: the expected number of starts at a sample is proportional to its weight.
-    fn starts(&self, n: u32, u: f32) -> Vec<ChainStart> {
-        let total: f64 = self.found.iter().map(|f| f64::from(f.1)).sum();
-        let mut starts = Vec::with_capacity(n as usize);
-        let (mut sum, mut next) = (0.0, f64::from(u));
-        for (start, weight) in &self.found {
-            sum += f64::from(*weight) / total * f64::from(n);
-            while next < sum && starts.len() < n as usize {
-                starts.push(*start);
-                next += 1.0;
-            }
-        }
-        // Rounding may leave the last one out.
-        if let Some((start, _)) = self.found.last() {
-            starts.resize(n as usize, *start);
-        }
-        starts
-    }
 }
 
 /// What a Metropolis job has learned. In memory, beside the groups' films: 24 bytes a pixel for the pilot's picture (until chains have
@@ -275,57 +240,6 @@ impl Metropolis {
         Some(plan(settings, pass, parts, chains, share.size, next.is_none()))
     }
 
-    /// Technique probabilities and the target map from the pilot.
-    fn learn(&self, settings: &RenderSettings, direct: impl Fn(usize) -> [f64; 3]) -> ChainConstants {
-        let depths = lengths(settings).map(|edges| {
-            let n = edges as usize + 1;
-            let sums = self.techniques.get(&edges).cloned().unwrap_or_default();
-            let total: f64 = sums.iter().sum();
-            let learned = settings.mmlt.learn && total > 0.0 && sums.len() == n;
-            // A fifth for all techniques alike: what the pilot missed keeps its chance.
-            let share = |s: usize| (0.2 / n as f64 + 0.8 * sums[s] / total) as f32;
-            Depth { edges, techniques: (0..n).map(|s| if learned { share(s) } else { 1.0 }).collect() }
-        });
-        let depths = depths.collect();
-        let (columns, target) = self.target_map(settings, direct);
-        let b: f64 = self.techniques.values().flatten().sum();
-        // The target map's factors are about one for what the picture consists of.
-        ChainConstants { depths, columns, target, threshold: (THRESHOLD_SHARE * b) as f32 }
-    }
-
-    /// `(I^2 + 0.01)^(-lift / 2)` by cell, I being the mean of what the pilot saw in and around the cell.
-    fn target_map(&self, settings: &RenderSettings, direct: impl Fn(usize) -> [f64; 3]) -> (u32, Vec<f32>) {
-        let (width, height) = (settings.width, settings.height);
-        let (columns, rows) = (width.div_ceil(TARGET_CELL), height.div_ceil(TARGET_CELL));
-        if settings.mmlt.lift == 0.0 || self.pilot.is_empty() {
-            return (columns, Vec::new());
-        }
-        let cells = (columns * rows) as usize;
-        let (mut sums, mut counts) = (vec![0.0f64; cells], vec![0.0f64; cells]);
-        for (i, v) in self.pilot.iter().enumerate() {
-            let (x, y) = (i as u32 % width, i as u32 / width);
-            let cell = (y / TARGET_CELL * columns + x / TARGET_CELL) as usize;
-            let d = direct(i);
-            sums[cell] += (0..3).map(|c| (v[c] + d[c]) / 3.0).sum::<f64>();
-            counts[cell] += 1.0;
-        }
-        // Cells share with their neighbours: the pilot is noisy.
-        let at = |x: i64, y: i64| {
-            let inside = x >= 0 && y >= 0 && x < i64::from(columns) && y < i64::from(rows);
-            inside.then(|| (y * i64::from(columns) + x) as usize)
-        };
-        let target = (0..cells as i64).map(|cell| {
-            let (x, y) = (cell % i64::from(columns), cell / i64::from(columns));
-            let around =
-                (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).filter_map(|(dx, dy)| at(x + dx, y + dy));
-            let (sum, count) = around.fold((0.0, 0.0), |(s, n), i| (s + sums[i], n + counts[i]));
-            let mean = sum / count;
-            pow64(mean * mean + 0.01, -0.5 * f64::from(settings.mmlt.lift)) as f32
-        });
-        let target = target.collect();
-        (columns, target)
-    }
-
     /// The pools for a pass.
     fn pools_of(settings: &RenderSettings, share: &Share) -> Vec<Part> {
         let samples = pool_samples(settings, f64::from(settings.mmlt.pool_share), share.density).min(MAX_POOLS)
@@ -400,65 +314,5 @@ impl Metropolis {
         let scaled: Vec<[f64; 3]> = self.pilot.iter().map(|v| v.map(|c| c * scale)).collect();
         film.replace_chains(&scaled, width as usize * height as usize);
         Some(film)
-    }
-}
-
-/// As bytes, for a merge that goes on later.
-impl Metropolis {
-    /// Appends everything.
-    pub fn save(&self, out: &mut Vec<u8>) {
-        for film in [&self.pilot, &self.pending] {
-            out.extend((film.len() as u64).to_le_bytes());
-            out.extend_from_slice(bytemuck::cast_slice(film));
-        }
-        [self.pilot_samples.0, self.pilot_samples.1].iter().for_each(|n| out.extend(u64::from(*n).to_le_bytes()));
-        out.extend((self.techniques.len() as u64).to_le_bytes());
-        for (edges, sums) in &self.techniques {
-            out.extend(u64::from(*edges).to_le_bytes());
-            out.extend((sums.len() as u64).to_le_bytes());
-            sums.iter().for_each(|v| out.extend(v.to_le_bytes()));
-        }
-        out.extend((self.pools.len() as u64).to_le_bytes());
-        for ((replicate, edges), pool) in &self.pools {
-            [*replicate, *edges, pool.samples].iter().for_each(|v| out.extend(u64::from(*v).to_le_bytes()));
-            out.extend((pool.found.len() as u64).to_le_bytes());
-            for (ChainStart(index, technique, target), weight) in &pool.found {
-                let words = [*index, *technique, target.to_bits(), weight.to_bits()];
-                words.iter().for_each(|v| out.extend(v.to_le_bytes()));
-            }
-        }
-    }
-
-    /// Takes what [`Metropolis::save`] wrote off the front of `bytes`; `None` when it is not that.
-    pub fn load(bytes: &mut &[u8], pixels: usize) -> Option<Self> {
-        let mut r = Reader(bytes);
-        let mut film = || {
-            let n = r.length().filter(|n| *n == 0 || *n == pixels)?;
-            let raw = r.take(n.checked_mul(24)?)?;
-            Some(raw.chunks_exact(24).map(bytemuck::pod_read_unaligned).collect::<Vec<[f64; 3]>>())
-        };
-        let (pilot, pending) = (film()?, film()?);
-        let mut count = || u32::try_from(r.length()?).ok();
-        let pilot_samples = (count()?, count()?);
-        let mut techniques = BTreeMap::new();
-        for _ in 0..r.length()? {
-            let (edges, n) = (u32::try_from(r.length()?).ok()?, r.length()?);
-            let sums = (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>()?;
-            techniques.insert(edges, sums);
-        }
-        let mut pools = BTreeMap::new();
-        for _ in 0..r.length()? {
-            let mut number = || u32::try_from(r.length()?).ok();
-            let (key, samples) = ((number()?, number()?), number()?);
-            let raw = r.length()?;
-            let raw = r.take(raw.checked_mul(16)?)?;
-            let entry = |b: &[u8]| {
-                let [index, technique, target, weight]: [u32; 4] = bytemuck::pod_read_unaligned(b);
-                (ChainStart(index, technique, f32::from_bits(target)), f32::from_bits(weight))
-            };
-            pools.insert(key, Pool { samples, found: raw.chunks_exact(16).map(entry).collect() });
-        }
-        *bytes = r.0;
-        Some(Self { pilot, pilot_samples, techniques, pools, pending })
     }
 }

@@ -1,0 +1,62 @@
+//! What the pilot teaches: probabilities of techniques, and where the picture is dark.
+
+use super::{Metropolis, lengths};
+use crate::integrator::mmlt::{ChainConstants, Depth, TARGET_CELL};
+use crate::job::settings::RenderSettings;
+use crate::math::pow64;
+
+/// Paths of a pool's sample below this share of the mean target are left to chance.
+const THRESHOLD_SHARE: f64 = 0.02;
+
+impl Metropolis {
+    /// Technique probabilities and the target map from the pilot.
+    pub(super) fn learn(&self, settings: &RenderSettings, direct: impl Fn(usize) -> [f64; 3]) -> ChainConstants {
+        let depths = lengths(settings).map(|edges| {
+            let n = edges as usize + 1;
+            let sums = self.techniques.get(&edges).cloned().unwrap_or_default();
+            let total: f64 = sums.iter().sum();
+            let learned = settings.mmlt.learn && total > 0.0 && sums.len() == n;
+            // A fifth for all techniques alike: what the pilot missed keeps its chance.
+            let share = |s: usize| (0.2 / n as f64 + 0.8 * sums[s] / total) as f32;
+            Depth { edges, techniques: (0..n).map(|s| if learned { share(s) } else { 1.0 }).collect() }
+        });
+        let depths = depths.collect();
+        let (columns, target) = self.target_map(settings, direct);
+        let b: f64 = self.techniques.values().flatten().sum();
+        // The target map's factors are about one for what the picture consists of.
+        ChainConstants { depths, columns, target, threshold: (THRESHOLD_SHARE * b) as f32 }
+    }
+
+    /// `(I^2 + 0.01)^(-lift / 2)` by cell, I being the mean of what the pilot saw in and around the cell.
+    fn target_map(&self, settings: &RenderSettings, direct: impl Fn(usize) -> [f64; 3]) -> (u32, Vec<f32>) {
+        let (width, height) = (settings.width, settings.height);
+        let (columns, rows) = (width.div_ceil(TARGET_CELL), height.div_ceil(TARGET_CELL));
+        if settings.mmlt.lift == 0.0 || self.pilot.is_empty() {
+            return (columns, Vec::new());
+        }
+        let cells = (columns * rows) as usize;
+        let (mut sums, mut counts) = (vec![0.0f64; cells], vec![0.0f64; cells]);
+        for (i, v) in self.pilot.iter().enumerate() {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            let cell = (y / TARGET_CELL * columns + x / TARGET_CELL) as usize;
+            let d = direct(i);
+            sums[cell] += (0..3).map(|c| (v[c] + d[c]) / 3.0).sum::<f64>();
+            counts[cell] += 1.0;
+        }
+        // Cells share with their neighbours: the pilot is noisy.
+        let at = |x: i64, y: i64| {
+            let inside = x >= 0 && y >= 0 && x < i64::from(columns) && y < i64::from(rows);
+            inside.then(|| (y * i64::from(columns) + x) as usize)
+        };
+        let target = (0..cells as i64).map(|cell| {
+            let (x, y) = (cell % i64::from(columns), cell / i64::from(columns));
+            let around =
+                (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).filter_map(|(dx, dy)| at(x + dx, y + dy));
+            let (sum, count) = around.fold((0.0, 0.0), |(s, n), i| (s + sums[i], n + counts[i]));
+            let mean = sum / count;
+            pow64(mean * mean + 0.01, -0.5 * f64::from(settings.mmlt.lift)) as f32
+        });
+        let target = target.collect();
+        (columns, target)
+    }
+}
