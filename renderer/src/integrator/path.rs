@@ -116,7 +116,8 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
                 let u = self.sampler.next_1d();
                 let factor = match here {
                     Vertex::Surface { .. } => roulette(beta * eta_scale, u),
-                    Vertex::Medium { .. } => roulette_in_medium(beta * eta_scale, u),
+                    Vertex::Medium { p, .. } if !scene.is_far(p) => roulette_in_medium(beta * eta_scale, u),
+                    Vertex::Medium { .. } => roulette(beta * eta_scale, u),
                 };
                 let Some(factor) = factor else { break };
                 beta *= factor;
@@ -244,7 +245,8 @@ fn target(li: &LiSample) -> Target {
 }
 
 /// Russian roulette in a medium. Where little is absorbed paths are long by nature: as many as the square of the optical thickness.
-/// Surfaces end one in twenty at each vertex, whatever it carries; here the few that came far would carry all of the light.
+/// Surfaces end one in twenty at each vertex, whatever it carries; here the few that came far would carry all of the light. (Paths
+/// that have left the scene for a medium without end hardly come back: those are treated as at surfaces.)
 #[inline]
 fn roulette_in_medium(throughput: Rgb, u: f32) -> Option<f32> {
     let q = throughput.max_component().min(0.9999);

@@ -17,8 +17,8 @@ pub use phase::{Example, Phase, roster};
 use crate::math::{ONE_MINUS_EPSILON, exp, ln_1p};
 use crate::spectrum::Rgb;
 
-/// Largest extinction coefficient: sums of three must be finite.
-pub const MAX_SIGMA: f32 = 1e30;
+/// Largest extinction coefficient: densities of points in a medium are products of it, and must be finite.
+pub const MAX_SIGMA: f32 = 1e12;
 
 /// Index of a medium in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

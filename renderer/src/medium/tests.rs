@@ -53,7 +53,7 @@ fn weighted_flights_estimate_the_transport_equation_in_every_channel() {
 
 #[test]
 fn grey_media_have_exact_weights_at_any_depth() {
-    for sigma in [1.3e-30f32, 7e-20, 3.3e-10, 1e-6, 0.017, 0.3, 1.0, 1.7, 19.0, 1e3, 7e6, 3e12, 9e23, MAX_SIGMA] {
+    for sigma in [1.3e-30f32, 7e-20, 3.3e-10, 1e-6, 0.017, 0.3, 1.0, 1.7, 19.0, 1e3, 7e6, 3e9, MAX_SIGMA] {
         let m = Medium::new(Rgb::splat(sigma), Rgb::new(0.9, 0.3, 1.0), Phase::Isotropic).unwrap();
         for t in [0.0, 1e-20, 1e-3, 1.0, 1e6] {
             assert_eq!(passing_weight(m.tau(t), &Channels::ALIKE), Rgb::ONE);
@@ -95,7 +95,7 @@ fn reaches_are_never_zero_and_end() {
 fn what_is_out_of_range_is_refused() {
     let new = |t: f32, a: f32| Medium::new(Rgb::splat(t), Rgb::splat(a), Phase::Isotropic).err();
     assert_eq!(new(1.0, 1.0), None);
-    for t in [-1.0, f32::NAN, f32::INFINITY, 1e31] {
+    for t in [-1.0, f32::NAN, f32::INFINITY, 1.1e12] {
         assert_eq!(new(t, 0.5), Some(MediumError::Extinction));
     }
     for a in [-0.1, f32::NAN, 1.1, f32::INFINITY] {

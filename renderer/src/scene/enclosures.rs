@@ -174,6 +174,11 @@ impl Scene {
             let message = "light from infinitely far does not arrive through the medium that fills the scene";
             diagnostics.warn(file, "", message, "let a shape with that medium as its interior bound it");
         }
+        let reach = self.bounds.centre.abs().max_element() + self.bounds.radius;
+        if self.media.iter().any(|m| m.scatters() && m.sigma_t.max_component() * reach * f32::EPSILON > 0.5) {
+            let message = "a medium is so dense that light goes unhindered in it for less than coordinates can tell";
+            diagnostics.warn(file, "", message, "a thinner one, or a diffuse surface, looks the same and is faster");
+        }
     }
 
     /// What encloses a light, if it is the same all over it.

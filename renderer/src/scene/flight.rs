@@ -13,6 +13,8 @@ use crate::spectrum::Rgb;
 const MOST_CROSSED: usize = 4096;
 /// Flatter rays than of this cosine are taken for as flat: the surface may bend away below them.
 const FLATTEST: f32 = 1e-3;
+/// What is scattered beyond this does not come back: squares of distances must be finite.
+const FARTHEST: f32 = 1e15;
 /// Nothing of a beam is left, in single precision, after this optical depth.
 const OPAQUE: f32 = 104.0;
 
@@ -121,10 +123,10 @@ impl Scene {
             let passed = end + skipped;
             let surface = hit.map(|h| self.geometry.interaction(&ray, &h));
             if let (Some((id, m)), true) = (scattering, limit.is_finite() && limit <= end) {
-                let p = match &surface {
-                    Some(s) => offset_ray_origin(s.p, s.p_error, s.ng, -ray.d),
-                    None => ray.at(limit),
-                };
+                let p = scattering_point(&ray, limit, surface.as_ref());
+                if limit > FARTHEST {
+                    return Flight { event: Event::Escaped, weight: Rgb::ZERO, tau: depth.scattering, around };
+                }
                 if !self.is_stray(p, &around) {
                     depth.add(m, whole);
                     let weight = transmittance(depth.absorbing) * m.scatter_weight(depth.scattering, channels);
@@ -204,11 +206,27 @@ impl Scene {
         None
     }
 
-    /// Whether a point can't be inside any of the objects that are said to be around it, since it is outside of the scene's bounds.
+    /// Whether a point can't be inside any of the objects that are said to be around it.
     #[inline]
     fn is_stray(&self, p: Vec3, around: &Enclosures) -> bool {
+        !around.is_empty() && self.is_far(p)
+    }
+
+    /// Whether a point is outside of the bounds of all objects.
+    #[inline]
+    pub fn is_far(&self, p: Vec3) -> bool {
         let r = self.bounds.radius * (1.0 + gamma(16));
-        !around.is_empty() && (p - self.bounds.centre).length_squared() > r * r
+        !((p - self.bounds.centre).length_squared() <= r * r)
+    }
+}
+
+/// Where a flight is scattered, `t` along its ray: before the surface, if it comes so near to one.
+#[inline]
+fn scattering_point(ray: &Ray, t: f32, surface: Option<&Interaction>) -> Vec3 {
+    match surface {
+        Some(s) => offset_ray_origin(s.p, s.p_error, s.ng, -ray.d),
+        // At least a unit in the last place on: an edge without length has no direction and no density.
+        None => ray.at(t.max(ray.o.abs().max_element() * f32::EPSILON)),
     }
 }
 

@@ -6,6 +6,7 @@ mod analytic;
 mod bidirectional;
 #[path = "../common/mod.rs"]
 mod common;
+mod extremes;
 mod flight;
 mod furnace;
 mod layers;

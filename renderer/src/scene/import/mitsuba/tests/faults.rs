@@ -167,6 +167,8 @@ fn damaged_scenes_never_panic() {
         <shape type='shapegroup' id='g'><shape type='sphere'><point name='center' x='1' y='0' z='0'/></shape></shape>
         <shape type='instance'><ref id='g'/><transform name='to_world'><matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'/></transform></shape>
         <shape type='disk'><emitter type='area'><rgb name='radiance' value='#ffee00'/></emitter></shape>
+        <medium type='homogeneous' id='fog'><rgb name='sigma_t' value='1 2 3'/><phase type='hg'><float name='g' value='0.5'/></phase></medium>
+        <shape type='cube'><bsdf type='null'/><ref name='interior' id='fog'/></shape>
         <emitter type='spot'><spectrum name='intensity' value='4'/></emitter></scene>";
     let mut loaded = 0;
     damage(valid.as_bytes(), 4000, |bytes| {

@@ -61,7 +61,7 @@ fn malformed_and_extreme_media_are_refused() {
         ("<float name='sigma_t' value='-1'/>", "`sigma_t` is -1"),
         ("<float name='sigma_t' value='nan'/>", "\"nan\""),
         ("<rgb name='albedo' value='1 1 1.5'/>", "`albedo` is 1.5"),
-        ("<float name='sigma_t' value='1e20'/><float name='scale' value='1e20'/>", "above 1e30"),
+        ("<float name='sigma_t' value='1e20'/><float name='scale' value='1e20'/>", "above 1e12"),
         ("<float name='sigma_t' value='1'/><float name='sigma_s' value='1'/>", "either `sigma_a`"),
         ("<string name='material' value='Skimmilk'/>", "by the name of a material"),
         ("<phase type='rayleigh'/>", "the phase `rayleigh` is not supported"),

@@ -112,12 +112,14 @@ fn hostile_files_end() {
 
 #[test]
 fn damaged_scenes_never_panic() {
-    let valid = "[camera]\nfrom = [0, 1, 5]\nto = [0, 0, 0]\nfov = 40\n[render]\nspp = 4\nfilter = { kind = 'tent' }
+    let valid = "medium = 'haze'\n[camera]\nfrom = [0, 1, 5]\nto = [0, 0, 0]\nfov = 40\n[render]\nspp = 4\nfilter = { kind = 'tent' }
 [textures.t]\nkind = 'image'\nsize = [2, 1]\npixels = [1, '#00ff00']\nuv = { scale = 2 }
 [materials.m]\nkind = 'conductor'\nmetal = 'Cu'\nalpha = { texture = 't', scale = 0.2 }\ntwo_sided = true
 [materials.n]\nkind = 'two-sided'\nfront = 'm'
 [meshes.q]\npositions = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntriangles = [[0, 1, 2]]\nshading = 'smooth'
 [[shapes]]\nkind = 'mesh'\nmesh = 'q'\nmaterial = 'n'\ninstances = [[{ rotate = 10, axis = [0, 1, 0] }], [{ scale = 2 }]]
+[media.haze]\nsigma_t = [0.1, 0.2, 0.3]\nalbedo = 0.9\nscale = 2\ng = 0.5\n[media.tea]\nsigma_a = 1
+[[shapes]]\nkind = 'cube'\ninterior = 'tea'\npriority = 1
 [[lights]]\nkind = 'environment'\nsize = [1, 1]\npixels = [2.5]\ntransform = [{ rotate_y = 1e1 }]\n";
     let mut loaded = 0;
     damage(valid.as_bytes(), 4000, |bytes| {
