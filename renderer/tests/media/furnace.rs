@@ -28,7 +28,7 @@ fn white_sky() -> Vec<LightDesc> {
 
 /// Optical thickness of the ball, samples per pixel, and how wide the interval may be.
 const DEPTHS: [(f32, u32, f64); 5] =
-    [(1e-6, 16, 1e-4), (1e-3, 16, 0.01), (1.0, 32, 0.02), (30.0, 64, 0.1), (100.0, 32, 0.2)];
+    [(1e-6, 16, 1e-4), (1e-3, 16, 0.01), (1.0, 64, 0.02), (30.0, 24, 0.1), (100.0, 32, 0.1)];
 
 #[test]
 fn media_that_absorb_nothing_vanish_in_a_white_sky() {
@@ -37,12 +37,12 @@ fn media_that_absorb_nothing_vanish_in_a_white_sky() {
             let medium = grey(0.5 * tau, 1.0, g);
             let seed = (10 * k + i) as u64;
             let what = format!("g {g}, depth {tau}");
-            let image = render(&furnace(medium, i % 2 == 0, k % 2 == 1), Path, (16, 16), spp, -1, seed);
+            let image = render(&furnace(medium, i % 2 == 1, k % 2 == 1), Path, (16, 16), spp, -1, seed);
             assert_mean(&image, 1.0, share, &what);
             if tau > 1.0 {
                 continue;
             }
-            let image = render(&furnace(medium, i % 2 == 1, k % 2 == 0), Path, (16, 16), spp, -1, seed + 100);
+            let image = render(&furnace(medium, i % 2 == 0, k % 2 == 0), Path, (16, 16), spp, -1, seed + 100);
             assert_mean(&image, 1.0, share, &format!("{what}, the other way round"));
         }
     }

@@ -66,9 +66,9 @@ fn thick_media_reflect_as_half_spaces() {
     let cases = [(1e3f32, 0.0), (1e4, 0.0), (1e5, 0.0), (1e6, 0.0), (1e3, 1.37), (1e4, -5.3), (1e5, 1.37)];
     for (i, (sigma, z)) in cases.into_iter().enumerate() {
         for (k, mu) in [1.0, 0.4].into_iter().enumerate() {
-            let image = render(&block(sigma, z, mu), Path, (32, 32), 96, -1, (10 * i + k) as u64);
+            let image = render(&block(sigma, z, mu), Path, (32, 32), 64, -1, (10 * i + k) as u64);
             let expected = 1.0 - h_function(0.9, mu) * 0.1f64.sqrt();
-            assert_mean(&image, expected, 0.03, &format!("depth {sigma} at {z}, mu {mu}"));
+            assert_mean(&image, expected, 0.04, &format!("depth {sigma} at {z}, mu {mu}"));
         }
     }
 }
