@@ -57,6 +57,8 @@ pub struct Metropolis {
     pub pilot_samples: (u32, u32),
     /// The pilot's sums of targets by path length and technique.
     pub techniques: BTreeMap<u32, Vec<f64>>,
+    /// What paths of a length contribute: the sum of `b` over all pools of the job.
+    pub contributions: BTreeMap<u32, f64>,
     /// The pools under way, by replicate and path length.
     pub pools: BTreeMap<(u32, u32), Pool>,
     /// Splats of the group and pass under way.
@@ -231,6 +233,9 @@ impl Metropolis {
         }
         let chains = before.chains.clone()?;
         let share = Share::after(settings, done)?;
+        for ((_, edges), pool) in &self.pools {
+            *self.contributions.entry(*edges).or_default() += pool.b();
+        }
         let mut parts = self.chains_of(settings, pass, &share, groups);
         self.pools.clear();
         let next = Share::after(settings, done + share.size);
@@ -256,10 +261,8 @@ impl Metropolis {
                 / groups;
         let lengths: Vec<u32> = lengths(settings).collect();
         // Mutations by what a length contributes, over the root of what one costs; a tenth for all alike.
-        let mean_b = |edges: u32| {
-            (0..settings.replicates).filter_map(|r| self.pools.get(&(r, edges))).map(Pool::b).sum::<f64>() / groups
-        };
-        let weights: Vec<f64> = lengths.iter().map(|k| mean_b(*k) / f64::from(*k).sqrt()).collect();
+        let contribution = |edges: &u32| self.contributions.get(edges).copied().unwrap_or_default();
+        let weights: Vec<f64> = lengths.iter().map(|k| contribution(k) / f64::from(*k).sqrt()).collect();
         let total: f64 = weights.iter().sum();
         // The length of a chain depends on nothing that the pools found.
         let length =

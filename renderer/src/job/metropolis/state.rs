@@ -18,6 +18,11 @@ impl Metropolis {
             out.extend((sums.len() as u64).to_le_bytes());
             sums.iter().for_each(|v| out.extend(v.to_le_bytes()));
         }
+        out.extend((self.contributions.len() as u64).to_le_bytes());
+        for (edges, b) in &self.contributions {
+            out.extend(u64::from(*edges).to_le_bytes());
+            out.extend(b.to_le_bytes());
+        }
         out.extend((self.pools.len() as u64).to_le_bytes());
         for ((replicate, edges), pool) in &self.pools {
             [*replicate, *edges, pool.samples].iter().for_each(|v| out.extend(u64::from(*v).to_le_bytes()));
@@ -46,6 +51,10 @@ impl Metropolis {
             let sums = (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>()?;
             techniques.insert(edges, sums);
         }
+        let mut contributions = BTreeMap::new();
+        for _ in 0..r.length()? {
+            contributions.insert(u32::try_from(r.length()?).ok()?, f64::from_bits(r.u64()?));
+        }
         let mut pools = BTreeMap::new();
         for _ in 0..r.length()? {
             let mut number = || u32::try_from(r.length()?).ok();
@@ -59,6 +68,6 @@ impl Metropolis {
             pools.insert(key, Pool { samples, found: raw.chunks_exact(16).map(entry).collect() });
         }
         *bytes = r.0;
-        Some(Self { pilot, pilot_samples, techniques, pools, pending })
+        Some(Self { pilot, pilot_samples, techniques, contributions, pools, pending })
     }
 }
