@@ -9,6 +9,7 @@ use crate::camera::Camera;
 use crate::geometry::Interaction;
 use crate::light::LightSelector;
 use crate::math::{Anchor, Ray, Vec2, Vec3};
+use crate::medium::Channels;
 use crate::sampling::Sampler;
 use crate::scene::{Enclosures, Event, Scene};
 use crate::spectrum::Rgb;
@@ -131,7 +132,9 @@ impl Tracer<'_> {
     /// The same where there are media: `u` samples how far the flight comes. Apart, so that it costs nothing where there are none.
     #[inline(never)]
     fn arrive_through_media(&mut self, path: &mut Subpath, u: f32, head: &mut Head, mode: Transport) -> bool {
-        let flight = self.scene.fly(&head.ray, head.around, u, &mut self.counters.rays);
+        // Densities are those of channels chosen alike: as weights need no more than one function of the path, they may be.
+        let channels = Channels::by_throughput(head.beta);
+        let flight = self.scene.fly_by(&channels, &head.ray, head.around, u, &mut self.counters.rays);
         head.beta *= flight.weight;
         head.around = flight.around;
         let from = path.vertices.last().and_then(Vertex::medium).copied();
