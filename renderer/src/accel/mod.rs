@@ -13,7 +13,7 @@ mod traverse;
 mod wide;
 
 use crate::geometry::{Geometry, Hit, Mesh, ObjectId, Shape};
-use crate::math::{Ray, Transform, Vec3};
+use crate::math::{Ray, Vec3};
 use placed::{Item, Placed};
 use wide::Tree;
 
@@ -69,7 +69,7 @@ impl Accel {
             if world.len() + mesh.triangles.len() > MAX_TRIANGLES {
                 return Err(AccelError::TooManyTriangles(world.len() + mesh.triangles.len()));
             }
-            if o.to_world == Transform::IDENTITY {
+            if o.to_world.is_identity() {
                 starts.push((world.len() as u32, object));
                 world.extend(triangles(mesh));
             } else if !mesh.triangles.is_empty() {

@@ -4,7 +4,7 @@ use super::simd::Simd;
 use super::*;
 use crate::geometry::triangle::Shear;
 use crate::geometry::{MeshId, Object};
-use crate::math::{DAffine3, DQuat, DVec3};
+use crate::math::{DAffine3, DQuat, DVec3, Transform};
 use crate::sampling::{IndependentSampler, Sampler, warp};
 
 fn vec3(s: &mut impl Sampler) -> Vec3 {

@@ -20,7 +20,7 @@ impl Geometry {
         }
         for object in &mut self.objects {
             let Shape::Mesh(id) = object.shape else { continue };
-            if object.to_world == Transform::IDENTITY {
+            if object.to_world.is_identity() {
                 continue;
             }
             let index = id.0 as usize;

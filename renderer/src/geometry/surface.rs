@@ -27,7 +27,7 @@ pub(super) fn at(mesh: &Mesh, object: &Object, triangle: u32, b: [f32; 2]) -> Su
     let [b1, b2] = b.map(f64::from);
     let local = p0 + (p1 - p0) * b1 + (p2 - p0) * b2;
     // Place the point and the edges in the world.
-    let placed = object.to_world != Transform::IDENTITY;
+    let placed = !object.to_world.is_identity();
     let (p, e1, e2, p_error) = if placed {
         let m = object.to_world.matrix();
         let p = m.transform_point3(local);

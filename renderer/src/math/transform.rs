@@ -7,12 +7,16 @@ pub struct Transform {
     m: [Vec3; 4],
     inv: [Vec3; 4],
     flips: bool,
+    /// Told in one word, since every hit asks.
+    identity: bool,
 }
+
+/// Columns of the identity.
+const IDENTITY: [Vec3; 4] = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ZERO];
 
 impl Transform {
     /// The identity.
-    pub const IDENTITY: Self =
-        Self { m: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ZERO], inv: [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ZERO], flips: false };
+    pub const IDENTITY: Self = Self { m: IDENTITY, inv: IDENTITY, flips: false, identity: true };
 
     /// From an affine map; `None` when it is singular or not finite.
     pub fn new(a: DAffine3) -> Option<Self> {
@@ -23,7 +27,8 @@ impl Transform {
         let inv = a.inverse();
         let columns =
             |a: &DAffine3| [a.matrix3.x_axis, a.matrix3.y_axis, a.matrix3.z_axis, a.translation].map(DVec3::as_vec3);
-        let t = Self { m: columns(&a), inv: columns(&inv), flips: det < 0.0 };
+        let (m, inv) = (columns(&a), columns(&inv));
+        let t = Self { m, inv, flips: det < 0.0, identity: m == IDENTITY && inv == IDENTITY };
         (t.m.iter().chain(&t.inv).all(|c| c.is_finite())).then_some(t)
     }
 
@@ -39,6 +44,12 @@ impl Transform {
         DAffine3 { matrix3: DMat3::from_cols(x, y, z), translation }
     }
 
+    /// Whether it is the identity.
+    #[inline]
+    pub fn is_identity(&self) -> bool {
+        self.identity
+    }
+
     /// Whether the map mirrors (negative determinant).
     #[inline]
     pub fn flips_handedness(&self) -> bool {
@@ -48,7 +59,7 @@ impl Transform {
     /// The inverse map.
     #[inline]
     pub fn inverse(&self) -> Self {
-        Self { m: self.inv, inv: self.m, flips: self.flips }
+        Self { m: self.inv, inv: self.m, ..*self }
     }
 
     /// Maps a point.
