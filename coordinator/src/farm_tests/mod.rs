@@ -48,11 +48,7 @@ fn a_hanging_worker_does_not_hold_up_the_end() {
 
 #[test]
 fn a_cut_connection_frees_the_units_at_once() {
-    let mut world = World::new(1);
-    world.faults = false;
-    world.add_job(job_id(1), 0, 1536);
-    world.add_worker(1.0);
-    world.call(0);
+    let mut world = World::with_one_worker();
     let board = |w: &World| w.farm.job(job_id(1)).unwrap().pass.as_ref().unwrap().board.clone();
     let count = board(&world).count();
     assert!(board(&world).free().len() < count);
@@ -71,11 +67,7 @@ fn a_cut_connection_frees_the_units_at_once() {
 
 #[test]
 fn a_silent_worker_loses_its_leases_when_they_run_out() {
-    let mut world = World::new(1);
-    world.faults = false;
-    world.add_job(job_id(1), 0, 1536);
-    world.add_worker(1.0);
-    world.call(0);
+    let mut world = World::with_one_worker();
     let leases = |w: &World| w.farm.job(job_id(1)).unwrap().pass.as_ref().unwrap().board.leases().count();
     world.farm.tick(at(9.9));
     assert_eq!(leases(&world), 1);
@@ -156,11 +148,7 @@ fn units_and_workers_that_fail_are_told_apart() {
 
 #[test]
 fn a_quarantined_worker_gets_nothing_more() {
-    let mut world = World::new(1);
-    world.faults = false;
-    world.add_job(job_id(1), 0, 1536);
-    world.add_worker(1.0);
-    world.call(0);
+    let mut world = World::with_one_worker();
     world.farm.quarantine(world.sims[0].id, "wrong bits");
     world.now = 1.0;
     world.call(0);

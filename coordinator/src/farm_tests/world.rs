@@ -123,6 +123,16 @@ impl World {
         }
     }
 
+    /// A job, and a worker that has taken up its first units; nothing goes wrong.
+    pub fn with_one_worker() -> Self {
+        let mut world = Self::new(1);
+        world.faults = false;
+        world.add_job(job_id(1), 0, 1536);
+        world.add_worker(1.0);
+        world.call(0);
+        world
+    }
+
     pub fn add_job(&mut self, id: JobId, priority: i32, side: u32) {
         self.add_job_of(IntegratorKind::Path, id, priority, side);
     }

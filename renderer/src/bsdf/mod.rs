@@ -65,6 +65,17 @@ pub enum Transport {
     Importance,
 }
 
+impl Transport {
+    /// What a path carries the other way.
+    #[inline]
+    pub const fn reversed(self) -> Self {
+        match self {
+            Self::Radiance => Self::Importance,
+            Self::Importance => Self::Radiance,
+        }
+    }
+}
+
 /// Which part of a BSDF a direction was drawn from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lobe {

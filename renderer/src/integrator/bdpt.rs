@@ -2,8 +2,8 @@
 //! camera and one from a light, combined by multiple importance sampling.
 
 use super::{UnitContext, tile};
-use crate::film::{Aov, Counters, Rect, SplatSums, TileSums};
-use crate::math::{Ray, Vec3};
+use crate::film::{Counters, Rect, SplatSums, TileSums};
+use crate::math::Ray;
 use crate::path::{Connection, Subpath, Tracer, VertexKind};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
@@ -161,27 +161,13 @@ pub fn render_tile(
         let mut light_sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + s.pixel, s.index);
         film.pixel = Rgb::ZERO;
         bdpt.sample(s.ray, &mut s.sampler, &mut light_sampler, &mut film);
-        if let Some(aov) = s.aov {
-            first_hit(aov, bdpt.camera_walk());
+        if let (Some(aov), [lens, first, ..]) = (s.aov, bdpt.camera_walk().vertices.as_slice())
+            && let VertexKind::Inner(at) = &first.kind
+        {
+            aov.add(&tile::shown(at, &lens.anchor, &first.anchor));
         }
         film.pixel
     })?;
     counters.add(&bdpt.counters());
     Some(tile)
-}
-
-/// What the walk met first, for the auxiliary images.
-fn first_hit(aov: &mut Aov, camera: &Subpath) {
-    let [lens, first, ..] = camera.vertices.as_slice() else { return };
-    let (albedo, normal) = match &first.kind {
-        VertexKind::Surface(shading) => (shading.bsdf.albedo(), shading.frame.n),
-        VertexKind::Medium(point) => (point.medium.albedo, Vec3::ZERO),
-        VertexKind::Lens | VertexKind::Light => return,
-    };
-    aov.add(&Aov {
-        albedo: albedo.to_array(),
-        normal: normal.to_array(),
-        depth: (first.anchor.p - lens.anchor.p).length(),
-        hits: 1.0,
-    });
 }

@@ -1,20 +1,17 @@
 //! Unidirectional path tracing: next-event estimation and BSDF sampling, combined by multiple importance sampling
 //! (Kajiya 1986; Veach 1997, chapter 9).
 
-mod vertex;
-
 use super::{UnitContext, tile};
+use crate::bsdf::{ShadingPoint, Transport};
 use crate::film::{Aov, Counters, Rect, TileSums};
-use crate::geometry::Interaction;
-use crate::light::LiSample;
-use crate::math::{Ray, Vec3};
+use crate::geometry::{Interaction, ObjectId};
+use crate::math::{Anchor, Ray, Vec3};
 use crate::medium::{Channels, passing_probability};
-use crate::path::{power_heuristic, roulette};
+use crate::path::{MediumPoint, Scattering, power_heuristic, roulette};
 use crate::sampling::Sampler;
-use crate::scene::{Enclosures, Event, Target};
+use crate::scene::{Enclosures, Event};
 use crate::spectrum::Rgb;
 use std::ops::Range;
-use vertex::Vertex;
 
 /// Renders samples `samples` of each pixel of a tile; `None` when stopped.
 pub fn render_tile(c: &UnitContext<'_>, rect: Rect, samples: Range<u32>, counters: &mut Counters) -> Option<TileSums> {
@@ -57,6 +54,14 @@ struct Leg {
     arrival: Arrival,
 }
 
+/// Where a path scatters.
+struct Here {
+    anchor: Anchor,
+    /// The object whose surface it is on; none in a medium.
+    object: Option<ObjectId>,
+    scattering: Scattering,
+}
+
 /// One path, through media or not.
 struct Walk<'a, 'b, S, const MEDIA: bool> {
     c: &'a UnitContext<'a>,
@@ -65,7 +70,7 @@ struct Walk<'a, 'b, S, const MEDIA: bool> {
     aov: Option<&'b mut Aov>,
 }
 
-impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
+impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
     /// Radiance that arrives along a camera ray.
     fn radiance(&mut self, camera_ray: Ray) -> Rgb {
         let scene = self.c.scene;
@@ -82,14 +87,14 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
             let event = self.fly(&mut leg, &mut beta);
             let Some(here) = self.arrive(&event, &leg, beta, edges, &mut total) else { break };
             if let (1, Some(aov)) = (edges, self.aov.as_deref_mut()) {
-                aov.add(&here.aov(camera_ray.o));
+                aov.add(&tile::shown(&here.scattering, &Anchor::free(camera_ray.o), &here.anchor));
             }
             if edges == self.c.max_depth {
                 break;
             }
 
             // Connect to a light.
-            if !here.is_delta_only() && self.c.carried.has(edges + 1) {
+            if !here.scattering.is_delta_only() && self.c.carried.has(edges + 1) {
                 let direct = self.next_event(&here, &leg.around);
                 self.add(&mut total, beta, direct);
             }
@@ -97,27 +102,25 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
             // Go on in a direction drawn from the BSDF or the phase function.
             let uc = self.sampler.next_1d();
             let u = self.sampler.next_2d();
-            let Some(s) = here.sample(uc, u) else { break };
-            beta *= s.weight;
+            let Some(s) = here.scattering.sample(uc, u, Transport::Radiance) else { break };
+            beta *= here.scattering.weight(&s);
             if beta.is_black() || !beta.is_valid() {
                 self.counters.admit(beta);
                 break;
             }
             eta_scale *= s.eta * s.eta;
-            let anchor = here.anchor();
-            leg.ray = here.ray(s.wi);
-            leg.arrival = Arrival { p: anchor.p, pdf: s.pdf, alone: s.delta };
+            leg.ray = here.anchor.ray(s.wi);
+            leg.arrival = Arrival { p: here.anchor.p, pdf: s.pdf, alone: s.lobe.delta };
             if MEDIA {
-                leg.around = here.around(scene, s.wi, &leg.around);
+                leg.around = scene.beside(here.object, &here.anchor, s.wi, &leg.around);
             }
 
             // End the path by chance when it carries little.
             if edges >= self.c.rr_depth {
                 let u = self.sampler.next_1d();
-                let factor = match here {
-                    Vertex::Surface { .. } => roulette(beta * eta_scale, u),
-                    Vertex::Medium { p, .. } if !scene.is_far(p) => roulette_in_medium(beta * eta_scale, u),
-                    Vertex::Medium { .. } => roulette(beta * eta_scale, u),
+                let factor = match here.scattering {
+                    Scattering::Medium(_) if !scene.is_far(here.anchor.p) => roulette_in_medium(beta * eta_scale, u),
+                    _ => roulette(beta * eta_scale, u),
                 };
                 let Some(factor) = factor else { break };
                 beta *= factor;
@@ -136,7 +139,7 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
             return hit.map_or(Event::Escaped, |hit| Event::Surface(scene.geometry.interaction(&leg.ray, &hit)));
         }
         let u = self.sampler.next_1d();
-        let flight = scene.fly_by(&Channels::by_throughput(*beta), &leg.ray, leg.around, u, &mut self.counters.rays);
+        let flight = scene.fly(&Channels::by_throughput(*beta), &leg.ray, leg.around, u, &mut self.counters.rays);
         *beta *= flight.weight;
         leg.around = flight.around;
         leg.arrival.pdf *= passing_probability(flight.tau);
@@ -145,7 +148,7 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
 
     /// Adds the light that is met there; what scatters the path, if it may go on.
     #[inline]
-    fn arrive(&mut self, event: &Event, leg: &Leg, beta: Rgb, edges: u32, total: &mut Rgb) -> Option<Vertex<'a>> {
+    fn arrive(&mut self, event: &Event, leg: &Leg, beta: Rgb, edges: u32, total: &mut Rgb) -> Option<Here> {
         let scene = self.c.scene;
         let wo = -leg.ray.d;
         match event {
@@ -159,9 +162,15 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
                 if self.c.carried.has(edges) {
                     self.add(total, beta, self.emitted(hit, wo, &leg.arrival));
                 }
-                Some(Vertex::surface(scene, *hit, wo))
+                let material = scene.objects[hit.object.0 as usize].material;
+                let shading = ShadingPoint::new(&scene.materials, &scene.textures, material, hit, wo);
+                let scattering = Scattering::Surface(shading);
+                Some(Here { anchor: hit.anchor(), object: Some(hit.object), scattering })
             }
-            Event::Scatter { p, medium } => Some(Vertex::Medium { p: *p, wo, medium: &scene.media[medium.0 as usize] }),
+            Event::Scatter { p, medium } => {
+                let scattering = Scattering::Medium(MediumPoint { medium: scene.media[medium.0 as usize], wo });
+                Some(Here { anchor: Anchor::free(*p), object: None, scattering })
+            }
         }
     }
 
@@ -205,43 +214,38 @@ impl<'a, S: Sampler, const MEDIA: bool> Walk<'a, '_, S, MEDIA> {
     }
 
     /// Light that comes straight from a chosen light.
-    fn next_event(&mut self, here: &Vertex, around: &Enclosures) -> Rgb {
+    fn next_event(&mut self, here: &Here, around: &Enclosures) -> Rgb {
         let scene = self.c.scene;
         let uc = self.sampler.next_1d();
         let u = self.sampler.next_2d();
         let Some(choice) = self.c.selector.sample(uc) else { return Rgb::ZERO };
         let light = &scene.lights[choice.index];
-        let from = here.anchor();
+        let Here { anchor: from, object, scattering } = here;
         let Some(li) = light.sample_li(&scene.light_context(), from.p, choice.u, u) else { return Rgb::ZERO };
-        let s = here.eval(li.wi);
-        if s.f.is_black() {
+        let (f, pdf_scattering) = scattering.eval_pdf(li.wi, Transport::Radiance);
+        if f.is_black() {
             return Rgb::ZERO;
         }
+        let cos = scattering.abs_cos(li.wi);
         let pdf = li.pdf * choice.pmf;
         let weighted = |pdf_scattering: f32| {
             let weight = if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
-            s.f * li.radiance * (s.cos * weight / pdf)
+            f * li.radiance * (cos * weight / pdf)
         };
         if MEDIA {
-            let around = here.around(scene, li.wi, around);
-            let target = target(&li);
-            let Some(through) = scene.transmission(&from, &target, around, &mut self.counters.rays) else {
+            let around = scene.beside(*object, from, li.wi, around);
+            let Some(through) = scene.transmission(from, &(&li).into(), around, &mut self.counters.rays) else {
                 return Rgb::ZERO;
             };
-            return weighted(s.pdf * passing_probability(through.tau)) * through.transmittance;
+            return weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
         }
-        let contribution = weighted(s.pdf);
+        let contribution = weighted(pdf_scattering);
         if contribution.is_black() {
             return Rgb::ZERO;
         }
         self.counters.rays += 1;
-        if scene.accel.occluded(&li.shadow_ray(&from)) { Rgb::ZERO } else { contribution }
+        if scene.accel.occluded(&li.shadow_ray(from)) { Rgb::ZERO } else { contribution }
     }
-}
-
-/// Where the shadow ray of a sample ends.
-fn target(li: &LiSample) -> Target {
-    if li.dist.is_infinite() { Target::Direction(li.wi) } else { Target::Point(li.light) }
 }
 
 /// Russian roulette in a medium. Where little is absorbed paths are long by nature: as many as the square of the optical thickness.

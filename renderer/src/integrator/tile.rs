@@ -1,6 +1,7 @@
 use super::UnitContext;
 use crate::film::{Aov, Rect, TileSums};
-use crate::math::Ray;
+use crate::math::{Anchor, Ray};
+use crate::path::Scattering;
 use crate::sampling::SobolSampler;
 use crate::spectrum::Rgb;
 use std::ops::Range;
@@ -50,4 +51,14 @@ pub fn render(
         }
     }
     Some(TileSums { rect, samples: samples.end - samples.start, sums, aovs })
+}
+
+/// What the first vertex of a path, at `at`, shows in the auxiliary images of a camera at `lens`.
+pub fn shown(scattering: &Scattering, lens: &Anchor, at: &Anchor) -> Aov {
+    Aov {
+        albedo: scattering.albedo().to_array(),
+        normal: scattering.normal().to_array(),
+        depth: (at.p - lens.p).length(),
+        hits: 1.0,
+    }
 }

@@ -75,13 +75,21 @@ impl Tracer<'_> {
     /// What comes through from a vertex to `target` in direction `w`; `None` when nothing does.
     pub fn arriving(&mut self, from: &Vertex, w: Vec3, target: Target) -> Option<Rgb> {
         let way = self.way(from, w, target)?;
-        if let Some(ray) = &way.shadow {
-            self.counters.rays += 1;
-            if self.scene.accel.occluded(ray) {
-                return None;
-            }
-        }
-        Some(way.transmittance)
+        self.is_clear(way.shadow.as_ref()).then_some(way.transmittance)
+    }
+
+    /// Whether nothing is in a path's way.
+    #[inline]
+    pub fn is_free(&mut self, path: &Connection) -> bool {
+        self.is_clear(path.shadow.as_ref())
+    }
+
+    /// Whether nothing blocks what is left to test of a way.
+    #[inline]
+    fn is_clear(&mut self, shadow: Option<&Ray>) -> bool {
+        let Some(ray) = shadow else { return true };
+        self.counters.rays += 1;
+        !self.scene.accel.occluded(ray)
     }
 
     /// Density of the distance of a flight through media ([`distance_density`]).
@@ -184,7 +192,7 @@ impl Tracer<'_> {
             (pdf_emit * per_area(&at.anchor, li.wi, d2), direct)
         };
         let onwards = onwards * self.distance(way.tau, at.medium());
-        let back = f64::from(scattering.pdf_reverse(li.wi, Transport::Importance)) * at.edge.backward;
+        let back = at.pdf_back(scattering, li.wi, Transport::Radiance);
         let h = self.heuristic;
         let camera_sum = camera.beyond(h, t - 1, onwards, back);
         // The camera walk that hits the light: its density over that of sampling the light, in the same measure.
@@ -212,7 +220,7 @@ impl Tracer<'_> {
         let (_, pdf_dir) = self.camera.pdf_we(-we.wi);
         let d2 = f64::from(we.dist) * f64::from(we.dist);
         let onwards = f64::from(pdf_dir) * per_area(&at.anchor, we.wi, d2) * self.distance(way.tau, at.medium());
-        let back = f64::from(scattering.pdf_reverse(we.wi, Transport::Radiance)) * at.edge.backward;
+        let back = at.pdf_back(scattering, we.wi, Transport::Importance);
         let weight = self.heuristic.weight(light.beyond(self.heuristic, s - 1, onwards, back), 0.0, 1.0);
         Some(Connection { value, weight, shadow: way.shadow, raster: Some(we.raster) })
     }
@@ -242,18 +250,10 @@ impl Tracer<'_> {
         let d2 = f64::from(d2);
         let to_x = f64::from(pdf_z) * per_area(&x.anchor, w, d2) * self.distance(way.tau, x.medium());
         let to_z = f64::from(pdf_x) * per_area(&z.anchor, w, d2) * self.distance(way.tau, z.medium());
-        let back_x = f64::from(at_x.pdf_reverse(-w, Transport::Radiance)) * x.edge.backward;
-        let back_z = f64::from(at_z.pdf_reverse(w, Transport::Importance)) * z.edge.backward;
+        let back_x = x.pdf_back(at_x, -w, Transport::Importance);
+        let back_z = z.pdf_back(at_z, w, Transport::Radiance);
         let h = self.heuristic;
         let weight = h.weight(light.beyond(h, s - 1, to_x, back_x), camera.beyond(h, t - 1, to_z, back_z), 1.0);
         Some(Connection { value, weight, shadow: way.shadow, raster: None })
-    }
-
-    /// Whether nothing is in a path's way.
-    #[inline]
-    pub fn is_free(&mut self, path: &Connection) -> bool {
-        let Some(ray) = &path.shadow else { return true };
-        self.counters.rays += 1;
-        !self.scene.accel.occluded(ray)
     }
 }

@@ -1,6 +1,5 @@
 //! What scatters at a vertex, surface or medium, in one interface.
 
-use super::vertex::{Vertex, VertexKind};
 use crate::bsdf::{DirectionSample, Lobe, ShadingPoint, Transport};
 use crate::math::{Vec2, Vec3};
 use crate::medium::Medium;
@@ -19,7 +18,7 @@ pub struct MediumPoint {
 impl MediumPoint {
     /// Draws `wi`.
     #[inline]
-    pub fn sample(&self, u: Vec2) -> DirectionSample {
+    fn sample(&self, u: Vec2) -> DirectionSample {
         let (wi, pdf) = self.medium.phase.sample(self.wo, u);
         DirectionSample { wi, f: Rgb::splat(pdf), pdf, cos_theta: 1.0, lobe: Lobe::DIFFUSE, eta: 1.0 }
     }
@@ -27,26 +26,32 @@ impl MediumPoint {
 
 /// What scatters at a vertex.
 #[derive(Clone, Copy, Debug)]
-pub enum Scattering<'a> {
+pub enum Scattering {
     /// A BSDF.
-    Surface(&'a ShadingPoint),
+    Surface(ShadingPoint),
     /// A phase function.
-    Medium(&'a MediumPoint),
+    Medium(MediumPoint),
 }
 
-impl Vertex {
-    /// What scatters here, if it can be connected to.
+impl Scattering {
+    /// Draws a direction: `uc` chooses between lobes, `u` the direction. `None` absorbs the path.
     #[inline]
-    pub(super) fn connectible(&self) -> Option<Scattering<'_>> {
-        match &self.kind {
-            VertexKind::Surface(shading) if !shading.is_delta_only() => Some(Scattering::Surface(shading)),
-            VertexKind::Medium(point) => Some(Scattering::Medium(point)),
-            _ => None,
+    pub fn sample(&self, uc: f32, u: Vec2, mode: Transport) -> Option<DirectionSample> {
+        match self {
+            Self::Surface(shading) => shading.sample(uc, u, mode),
+            Self::Medium(point) => Some(point.sample(u)),
         }
     }
-}
 
-impl Scattering<'_> {
+    /// What the throughput of a path that goes on by `s` is multiplied by. Phase functions are sampled perfectly.
+    #[inline]
+    pub fn weight(&self, s: &DirectionSample) -> Rgb {
+        match self {
+            Self::Surface(_) => s.weight(),
+            Self::Medium(_) => Rgb::ONE,
+        }
+    }
+
     /// Value without cosine and density per solid angle for `wi`.
     #[inline(always)]
     pub fn eval_pdf(&self, wi: Vec3, mode: Transport) -> (Rgb, f32) {
@@ -83,6 +88,31 @@ impl Scattering<'_> {
         match self {
             Self::Surface(shading) => shading.adjoint_correction(wi),
             Self::Medium(_) => 1.0,
+        }
+    }
+
+    /// Whether nothing but delta lobes is there: nothing can be connected to it.
+    #[inline]
+    pub fn is_delta_only(&self) -> bool {
+        match self {
+            Self::Surface(shading) => shading.is_delta_only(),
+            Self::Medium(_) => false,
+        }
+    }
+
+    /// Rough share of light that is scattered, in [0, 1].
+    pub fn albedo(&self) -> Rgb {
+        match self {
+            Self::Surface(shading) => shading.bsdf.albedo(),
+            Self::Medium(point) => point.medium.albedo,
+        }
+    }
+
+    /// The shading normal; a medium has none, zero.
+    pub fn normal(&self) -> Vec3 {
+        match self {
+            Self::Surface(shading) => shading.frame.n,
+            Self::Medium(_) => Vec3::ZERO,
         }
     }
 }

@@ -1,6 +1,6 @@
 use super::mis::{Heuristic, Step};
-use super::scattering::MediumPoint;
-use crate::bsdf::ShadingPoint;
+use super::scattering::Scattering;
+use crate::bsdf::Transport;
 use crate::geometry::ObjectId;
 use crate::light::LightFlags;
 use crate::math::{Anchor, Vec3};
@@ -15,10 +15,8 @@ pub enum VertexKind {
     Lens,
     /// A point (or, infinitely far away, a direction) of a light.
     Light,
-    /// A surface.
-    Surface(ShadingPoint),
-    /// A point of a medium.
-    Medium(MediumPoint),
+    /// A surface, or a point of a medium.
+    Inner(Scattering),
 }
 
 /// A vertex of a walk.
@@ -67,18 +65,31 @@ impl Vertex {
     #[inline]
     pub fn medium(&self) -> Option<&Medium> {
         match &self.kind {
-            VertexKind::Medium(point) => Some(&point.medium),
+            VertexKind::Inner(Scattering::Medium(point)) => Some(&point.medium),
             _ => None,
         }
+    }
+
+    /// What scatters here, if it can be connected to.
+    #[inline]
+    pub(super) fn connectible(&self) -> Option<&Scattering> {
+        match &self.kind {
+            VertexKind::Inner(at) if !at.is_delta_only() => Some(at),
+            _ => None,
+        }
+    }
+
+    /// Density with which a walk from the other end makes the vertex before, when it comes here from `w`; `mode` is that of this
+    /// vertex's own walk.
+    #[inline]
+    pub(super) fn pdf_back(&self, at: &Scattering, w: Vec3, mode: Transport) -> f64 {
+        f64::from(at.pdf_reverse(w, mode.reversed())) * self.edge.backward
     }
 
     /// What encloses a ray that leaves in direction `w`.
     #[inline]
     pub fn around_towards(&self, scene: &Scene, w: Vec3) -> Enclosures {
-        match self.object {
-            Some(object) => scene.beside(object, self.anchor.ng.dot(w) < 0.0, &self.around),
-            None => self.around,
-        }
+        scene.beside(self.object, &self.anchor, w, &self.around)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Random walks from the camera and from the lights.
 
 use super::mis::{Heuristic, delta_density};
-use super::scattering::MediumPoint;
+use super::scattering::{MediumPoint, Scattering};
 use super::vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};
 use super::{Counters, roulette};
 use crate::bsdf::{DirectionSample, ShadingPoint, Transport};
@@ -134,7 +134,7 @@ impl Tracer<'_> {
     fn arrive_through_media(&mut self, path: &mut Subpath, u: f32, head: &mut Head, mode: Transport) -> bool {
         // Densities are those of channels chosen alike: as weights need no more than one function of the path, they may be.
         let channels = Channels::by_throughput(head.beta);
-        let flight = self.scene.fly_by(&channels, &head.ray, head.around, u, &mut self.counters.rays);
+        let flight = self.scene.fly(&channels, &head.ray, head.around, u, &mut self.counters.rays);
         head.beta *= flight.weight;
         head.around = flight.around;
         let from = path.vertices.last().and_then(Vertex::medium).copied();
@@ -147,9 +147,9 @@ impl Tracer<'_> {
                 let medium = self.scene.media[medium.0 as usize];
                 let anchor = Anchor::free(*p);
                 let edge = self.edge_to(path, &anchor, &head.ray).through(flight.tau, from.as_ref(), Some(&medium));
-                let kind = VertexKind::Medium(MediumPoint { medium, wo: -head.ray.d });
+                let at = Scattering::Medium(MediumPoint { medium, wo: -head.ray.d });
                 let (beta, around) = (head.beta, head.around);
-                let first = Vertex::first(kind, anchor, head.pdf * edge.forward);
+                let first = Vertex::first(VertexKind::Inner(at), anchor, head.pdf * edge.forward);
                 path.vertices.push(Vertex { beta, around, edge, ..first });
             }
             Event::Surface(hit) => {
@@ -174,7 +174,7 @@ impl Tracer<'_> {
             _ => None,
         };
         path.vertices.push(Vertex {
-            kind: VertexKind::Surface(shading),
+            kind: VertexKind::Inner(Scattering::Surface(shading)),
             anchor: hit.anchor(),
             beta: head.beta,
             pdf_fwd: head.pdf * edge.forward,
@@ -193,17 +193,14 @@ impl Tracer<'_> {
     fn depart(&self, path: &mut Subpath, sampler: &mut impl Sampler, head: &mut Head, mode: Transport) -> Option<f32> {
         let (uc, u) = (sampler.next_1d(), sampler.next_2d());
         let last = path.vertices.last()?;
-        let s = match &last.kind {
-            VertexKind::Surface(shading) => shading.sample(uc, u, mode)?,
-            VertexKind::Medium(point) => point.sample(u),
-            VertexKind::Lens | VertexKind::Light => return None,
-        };
-        head.beta *= s.weight();
-        if let (Transport::Importance, VertexKind::Surface(shading)) = (mode, &last.kind) {
-            head.beta *= shading.adjoint_correction(s.wi);
+        let VertexKind::Inner(at) = &last.kind else { return None };
+        let s = at.sample(uc, u, mode)?;
+        head.beta *= at.weight(&s);
+        if mode == Transport::Importance {
+            head.beta *= at.adjoint_correction(s.wi);
         }
-        head.pdf = match (s.lobe.delta, mode, &last.kind) {
-            (true, Transport::Radiance, VertexKind::Surface(shading)) => {
+        head.pdf = match (s.lobe.delta, mode, at) {
+            (true, Transport::Radiance, Scattering::Surface(shading)) => {
                 delta_density(s.cos_theta, shading.wo.z.abs(), s.eta)
             }
             (true, ..) => 1.0,
@@ -241,20 +238,16 @@ impl Tracer<'_> {
     #[inline]
     fn leave(&self, path: &mut Subpath, s: &DirectionSample, mode: Transport) {
         let last = path.vertices.len() - 1;
-        let back = match mode {
-            Transport::Radiance => Transport::Importance,
-            Transport::Importance => Transport::Radiance,
-        };
-        let pdf_back = match (&path.vertices[last].kind, s.lobe.delta) {
-            (VertexKind::Surface(shading), false) => f64::from(shading.pdf_reverse(s.wi, back)),
-            (VertexKind::Surface(shading), true) if mode == Transport::Importance => {
-                delta_density(shading.wo.z.abs(), s.cos_theta, 1.0 / s.eta)
+        let v = &path.vertices[last];
+        let pdf_back = match (&v.kind, s.lobe.delta) {
+            (VertexKind::Inner(at), false) => v.pdf_back(at, s.wi, mode),
+            (VertexKind::Inner(Scattering::Surface(shading)), true) if mode == Transport::Importance => {
+                delta_density(shading.wo.z.abs(), s.cos_theta, 1.0 / s.eta) * v.edge.backward
             }
-            (VertexKind::Medium(point), _) => f64::from(point.medium.phase.pdf(s.wi, point.wo)),
-            _ => 1.0,
+            _ => v.edge.backward,
         };
         let before = path.vertices.get(last.wrapping_sub(2)).map_or(0.0, |v| v.tail);
-        let step = path.step(last - 1, pdf_back * path.vertices[last].edge.backward, false);
+        let step = path.step(last - 1, pdf_back, false);
         path.vertices[last - 1].tail = self.heuristic.fold(before, step);
         path.vertices[last].delta = s.lobe.delta;
     }

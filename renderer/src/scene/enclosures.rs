@@ -105,10 +105,14 @@ impl Scene {
         Some((id, &self.media[id.0 as usize]))
     }
 
-    /// What encloses the points beside a surface of `object`, on its inner or outer side, given what encloses either side.
+    /// What encloses a ray that leaves `from` in direction `w`: a point of the surface of `object`, either side of which `around`
+    /// encloses, or of free space.
     #[inline]
-    pub fn beside(&self, object: ObjectId, inner: bool, around: &Enclosures) -> Enclosures {
-        if self.objects[object.0 as usize].boundary.is_some() { around.set(object, inner) } else { *around }
+    pub fn beside(&self, object: Option<ObjectId>, from: &Anchor, w: Vec3, around: &Enclosures) -> Enclosures {
+        match object {
+            Some(o) if self.objects[o.0 as usize].boundary.is_some() => around.set(o, from.ng.dot(w) < 0.0),
+            _ => *around,
+        }
     }
 
     /// What encloses a ray beyond a surface that it passes straight on: a null one, or one inside an object of higher rank, where it
@@ -159,10 +163,11 @@ impl Scene {
     pub fn enclosures_of_light(&self, light: usize, start: &Anchor, w: Vec3) -> Enclosures {
         let known = self.light_enclosures.get(light).copied().flatten();
         let around = known.unwrap_or_else(|| self.enclosures_at(start.ray(w).o));
-        match &self.lights[light] {
-            Light::Area(area) => self.beside(area.object(), start.ng.dot(w) < 0.0, &around),
-            _ => around,
-        }
+        let object = match &self.lights[light] {
+            Light::Area(area) => Some(area.object()),
+            _ => None,
+        };
+        self.beside(object, start, w, &around)
     }
 
     /// Finds what encloses the camera and the lights.

@@ -95,15 +95,10 @@ impl Depth {
 }
 
 impl Scene {
-    /// Follows a ray (of unit direction) from a point inside `around` to what it meets; `u` in [0, 1) samples how far it comes.
-    /// `rays` counts the rays that are cast.
-    pub fn fly(&self, ray: &Ray, around: Enclosures, u: f32, rays: &mut u64) -> Flight {
-        self.fly_by(&Channels::ALIKE, ray, around, u, rays)
-    }
-
-    /// The same with channels chosen otherwise, which the weight takes into account; densities that follow from `tau` are still
-    /// those of channels chosen alike, and serve as such in weights of multiple importance sampling.
-    pub fn fly_by(&self, channels: &Channels, ray: &Ray, around: Enclosures, u: f32, rays: &mut u64) -> Flight {
+    /// Follows a ray (of unit direction) from a point inside `around` to what it meets; `u` in [0, 1) samples how far it comes, in a
+    /// channel chosen by `channels`, which the weight takes into account. Densities that follow from `tau` are those of channels
+    /// chosen alike, and serve as such in weights of multiple importance sampling. `rays` counts the rays that are cast.
+    pub fn fly(&self, channels: &Channels, ray: &Ray, around: Enclosures, u: f32, rays: &mut u64) -> Flight {
         let mut reach = Reach::new(u, self.features.chromatic_media.then_some(channels));
         let (mut ray, mut around) = (*ray, around);
         let mut depth = Depth::default();

@@ -4,7 +4,7 @@ use crate::scenes::{BLACK, GLASS, NULL, ball, body, desc, grey, scene};
 use renderer::geometry::ObjectId;
 use renderer::light::LightDesc;
 use renderer::math::{Anchor, DVec3, Ray, Vec3, exp, exp_m1};
-use renderer::medium::passing_probability;
+use renderer::medium::{Channels, passing_probability};
 use renderer::sampling::{IndependentSampler, Sampler, warp};
 use renderer::scene::desc::{ShapeDesc, ShapeKind};
 use renderer::scene::{Enclosures, Event, Scene, Target};
@@ -126,11 +126,11 @@ fn surfaces_inside_an_object_of_higher_priority_are_not_there() {
     // Leaving the cube inside of the ball a ray is in the glass.
     let around = s.enclosures_at(Vec3::X * 0.5);
     let mut rays = 0;
-    let flight = s.fly(&Ray::new(Vec3::X * 0.5, Vec3::NEG_X), around, 0.9999, &mut rays);
+    let flight = s.fly(&Channels::ALIKE, &Ray::new(Vec3::X * 0.5, Vec3::NEG_X), around, 0.9999, &mut rays);
     let Event::Surface(hit) = flight.event else { panic!("{flight:?}") };
     assert!(hit.object == ObjectId(0) && (hit.p + Vec3::X).length() < 1e-5, "{hit:?}");
     assert_eq!(objects(&flight.around), [0]);
-    assert_eq!(objects(&s.beside(hit.object, false, &flight.around)), [0u32; 0]);
+    assert_eq!(objects(&s.beside(Some(hit.object), &hit.anchor(), hit.ng, &flight.around)), [0u32; 0]);
     assert!((passing_probability(flight.tau) - exp(-0.05)).abs() < 1e-6);
     assert_eq!((flight.weight, rays), (Rgb::ONE, 2));
 }
@@ -153,7 +153,7 @@ fn glass_of_matching_index_is_passed_and_media_fill_what_is_left() {
     }
     // To infinity, an absorbing medium lets only clear channels through, sampled or not.
     let mut rays = 0;
-    let out = s.fly(&Ray::new(Vec3::X * 3.0, Vec3::X), Enclosures::default(), 0.1, &mut rays);
+    let out = s.fly(&Channels::ALIKE, &Ray::new(Vec3::X * 3.0, Vec3::X), Enclosures::default(), 0.1, &mut rays);
     assert!(matches!(out.event, Event::Escaped));
     assert_eq!(out.weight, Rgb::new(0.0, 1.0, 0.0));
     assert_eq!(out.tau, Rgb::ZERO);
@@ -168,7 +168,7 @@ fn what_rounding_moves_out_of_an_object_does_not_stay_inside_of_it() {
     let inside = Enclosures::default().set(ObjectId(0), true);
     let mut rays = 0;
     // Said to be inside, but beyond the surface on a ray that meets nothing.
-    let flight = s.fly(&Ray::new(Vec3::X * 1.9, Vec3::X), inside, 0.5, &mut rays);
+    let flight = s.fly(&Channels::ALIKE, &Ray::new(Vec3::X * 1.9, Vec3::X), inside, 0.5, &mut rays);
     assert!(matches!(flight.event, Event::Escaped) && flight.around.is_empty());
     let sky = s.transmission(&Anchor::free(Vec3::X * 1.5), &Target::Direction(Vec3::X), inside, &mut rays).unwrap();
     assert_eq!(sky.transmittance, Rgb::ONE);
@@ -185,7 +185,7 @@ fn scatterings_next_to_a_surface_stay_on_their_side_of_it() {
         // Numbers whose flights end within some 1e-6 of the surface.
         for k in -4i32..=4 {
             let u = -exp_m1(-5.0) + k as f32 * (0.5 * f32::EPSILON);
-            let flight = s.fly(&Ray::new(Vec3::ZERO, d), inside, u, &mut rays);
+            let flight = s.fly(&Channels::ALIKE, &Ray::new(Vec3::ZERO, d), inside, u, &mut rays);
             let Event::Scatter { p, .. } = flight.event else { continue };
             assert!(p.as_dvec3().length() < 1.0, "{p}");
             near += 1;

@@ -10,6 +10,7 @@ use crate::math::ln64;
 use crate::medium::{MAX_SIGMA, Medium, MediumId, Phase};
 use crate::scene::desc::Emission;
 use crate::scene::import::image::ImageKind;
+use crate::scene::import::medium;
 use crate::spectrum::Rgb;
 use crate::texture::{FloatParam, RgbParam, Texture, TextureId};
 use gltf::json;
@@ -190,8 +191,7 @@ impl Importer<'_> {
         if sigma_t.is_black() {
             return None;
         }
-        self.scene.media.push(Medium { sigma_t, albedo: Rgb::ZERO, phase: Phase::Isotropic });
-        Some(MediumId(self.scene.media.len() as u32 - 1))
+        Some(medium::push(&mut self.scene, Medium { sigma_t, albedo: Rgb::ZERO, phase: Phase::Isotropic }))
     }
 
     fn ior(&mut self, m: &Reading<'_>) -> f32 {

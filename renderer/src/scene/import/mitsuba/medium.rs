@@ -4,8 +4,8 @@ use super::Builder;
 use super::document::NodeId;
 use super::reader::Reader;
 use crate::medium::{MediumId, Phase};
-use crate::scene::import::importer::Place;
-use crate::scene::import::medium::Coefficients;
+use crate::scene::import::importer::{Importer, Place};
+use crate::scene::import::medium::{Coefficients, Parameters};
 use crate::scene::import::number::Bound;
 use crate::spectrum::Rgb;
 
@@ -54,22 +54,8 @@ impl Builder<'_, '_, '_> {
         if let Some(prop) = reader.get("material") {
             importer.error(prop.at, "media by the name of a material are not supported", "give `sigma_t` and `albedo`");
         }
-        let parts = reader.has("sigma_a") || reader.has("sigma_s");
-        if parts && (reader.has("sigma_t") || reader.has("albedo")) {
-            importer.error(node.at, "give either `sigma_a` and `sigma_s`, or `sigma_t` and `albedo`", "");
-        }
-        let mut rgb = |name, bound| reader.rgb(importer, name, bound);
-        let coefficients = if parts {
-            let (sigma_a, sigma_s) = (rgb("sigma_a", Bound::NotNegative), rgb("sigma_s", Bound::NotNegative));
-            Coefficients::Parts { sigma_a: sigma_a.unwrap_or(Rgb::ZERO), sigma_s: sigma_s.unwrap_or(Rgb::ZERO) }
-        } else {
-            let (sigma_t, albedo) = (rgb("sigma_t", Bound::NotNegative), rgb("albedo", Bound::Unit));
-            // Mitsuba's defaults.
-            Coefficients::Extinction {
-                sigma_t: sigma_t.unwrap_or(Rgb::ONE),
-                albedo: albedo.unwrap_or(Rgb::splat(0.75)),
-            }
-        };
+        // Mitsuba's default albedo.
+        let coefficients = Coefficients::read(importer, node.at, &mut reader, 0.75);
         let scale = reader.float_or(importer, "scale", Bound::NotNegative, 1.0);
         reader.finish(importer, self.document, &HARMLESS);
         importer.add_medium(node.at, coefficients, scale, phase)
@@ -136,5 +122,15 @@ impl Builder<'_, '_, '_> {
                 self.importer.warn(at, message, "let a shape bound this one");
             }
         }
+    }
+}
+
+impl Parameters for Reader<'_> {
+    fn has(&self, name: &str) -> bool {
+        self.has(name)
+    }
+
+    fn rgb(&mut self, importer: &mut Importer, name: &'static str, bound: Bound) -> Option<Rgb> {
+        self.rgb(importer, name, bound)
     }
 }

@@ -4,7 +4,8 @@ use super::Builder;
 use super::table::{Item, Table};
 use crate::diagnostics::nearest;
 use crate::medium::{MediumId, Phase};
-use crate::scene::import::medium::Coefficients;
+use crate::scene::import::importer::Importer;
+use crate::scene::import::medium::{Coefficients, Parameters};
 use crate::scene::import::number::Bound;
 use crate::spectrum::Rgb;
 
@@ -40,17 +41,7 @@ impl<'t> Builder<'t, '_, '_> {
     fn build_medium(&mut self, mut table: Table<'t>) -> Option<MediumId> {
         let importer = &mut *self.importer;
         let at = table.at;
-        let parts = table.has("sigma_a") || table.has("sigma_s");
-        let coefficients = if parts {
-            if table.has("sigma_t") || table.has("albedo") {
-                importer.error(at, "give either `sigma_a` and `sigma_s`, or `sigma_t` and `albedo`", "");
-            }
-            let sigma_a = table.rgb(importer, "sigma_a", Bound::NotNegative, Rgb::ZERO);
-            Coefficients::Parts { sigma_a, sigma_s: table.rgb(importer, "sigma_s", Bound::NotNegative, Rgb::ZERO) }
-        } else {
-            let sigma_t = table.rgb(importer, "sigma_t", Bound::NotNegative, Rgb::ONE);
-            Coefficients::Extinction { sigma_t, albedo: table.rgb(importer, "albedo", Bound::Unit, Rgb::ZERO) }
-        };
+        let coefficients = Coefficients::read(importer, at, &mut table, 0.0);
         // Known all the same, for the message that lists what is.
         for key in ["sigma_a", "sigma_s", "sigma_t", "albedo"] {
             table.get(key);
@@ -62,8 +53,18 @@ impl<'t> Builder<'t, '_, '_> {
     }
 }
 
+impl Parameters for Table<'_> {
+    fn has(&self, name: &str) -> bool {
+        self.has(name)
+    }
+
+    fn rgb(&mut self, importer: &mut Importer, name: &'static str, bound: Bound) -> Option<Rgb> {
+        self.get(name)?.rgb(importer, name, bound)
+    }
+}
+
 /// `phase`, which is `"hg"` where `g` is given.
-fn phase(importer: &mut crate::scene::import::importer::Importer, table: &mut Table) -> Phase {
+fn phase(importer: &mut Importer, table: &mut Table) -> Phase {
     let has_g = table.has("g");
     let kind = match table.has("phase") {
         true => table.choice(importer, "phase", &PHASES),
