@@ -32,11 +32,12 @@ fn made_up(plan: &PassPlan, unit: &Unit) -> UnitResult {
     let counters = Counters { samples: 10 + u64::from(unit.id), rays: 20, non_finite: 0, negative: 0 };
     let mut result = UnitResult { counters, ..UnitResult::default() };
     match unit.kind {
-        UnitKind::Tile { rect, start, end } => {
-            let sums = (0..rect.area()).map(|i| Rgb::new(value(i), value(i + 1), 1.0 / 3.0)).collect();
+        UnitKind::Tile { rect, covered, start, end } => {
+            let sums = (0..covered.area()).map(|i| Rgb::new(value(i), value(i + 1), 1.0 / 3.0)).collect();
             let aov = |i: usize| Aov { depth: value(i), hits: 1.0, ..Aov::default() };
             let aovs = if unit.replicate == 0 { (0..rect.area()).map(aov).collect() } else { Vec::new() };
-            result.tile = Some(TileSums { rect, samples: end - start, sums, aovs });
+            let weights = vec![(end - start) as f32; covered.area()];
+            result.tile = Some(TileSums { rect, covered, samples: end - start, sums, weights, aovs });
             if plan.sampling == Sampling::SplattingTiles {
                 result.splats = Some(splats(plan, unit));
                 result.paths = rect.area() as u64 * u64::from(end - start);
@@ -99,7 +100,7 @@ fn every_sample_of_every_pixel_is_planned_exactly_once() {
         let s = settings(IntegratorKind::Path, size, spp);
         let mut taken = vec![vec![0u64; s.replicates as usize]; (size.0 * size.1) as usize];
         run(&s, |_, unit, result| {
-            let UnitKind::Tile { rect, start, end } = unit.kind else { panic!("a path tracer's unit is a tile") };
+            let UnitKind::Tile { rect, start, end, .. } = unit.kind else { panic!("a path tracer's unit is a tile") };
             for (x, y) in rect.pixels() {
                 let group = &mut taken[(y * size.0 + x) as usize][unit.replicate as usize];
                 assert_eq!(*group, u64::from(start), "samples of a group follow each other");

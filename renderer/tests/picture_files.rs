@@ -29,7 +29,11 @@ fn groups(count: u32) -> (Vec<GroupFilm>, Vec<Aov>) {
     for _ in 0..count {
         let sums = (0..rect.area()).map(|_| Rgb::new(noise.next(), 2.0 * noise.next(), 3.0 * noise.next())).collect();
         let mut film = GroupFilm::Empty;
-        film.add_tile(WIDTH, HEIGHT, &TileSums { rect, samples: 2, sums, aovs: Vec::new() });
+        film.add_tile(
+            WIDTH,
+            HEIGHT,
+            &TileSums { rect, covered: rect, samples: 2, sums, weights: vec![2.0; rect.area()], aovs: Vec::new() },
+        );
         films.push(film);
     }
     let aov =

@@ -109,12 +109,12 @@ struct Session<'a> {
 impl Session<'_> {
     fn run(&self, kinds: &[IntegratorKind], rows: &mut Vec<Row>) -> Result<(), String> {
         let path = self.render(IntegratorKind::Path, None)?;
-        let reference = Picture::Rendered(&path.image, IntegratorKind::Path);
+        let reference = path.picture();
         rows.push(self.row(&path, IntegratorKind::Path, None));
         self.known(&path, IntegratorKind::Path, rows)?;
         for &kind in kinds.iter().filter(|k| **k != IntegratorKind::Light || self.case.light) {
             let own = self.render(kind, None)?;
-            let comparison = compare(&own.image, &Picture::Rendered(&own.image, kind), &reference);
+            let comparison = compare(&own.image, &own.picture(), &reference);
             rows.push(self.row(&own, kind, Some(("path".into(), comparison))));
             self.known(&own, kind, rows)?;
         }
@@ -126,7 +126,7 @@ impl Session<'_> {
         let Some(exact) = self.case.exact else { return Ok(()) };
         let mut test = |own: &Rendering, depth: Option<u32>| {
             let truth = exact(depth);
-            let comparison = compare(&own.image, &Picture::Rendered(&own.image, kind), &Picture::Exact(truth));
+            let comparison = compare(&own.image, &own.picture(), &Picture::Exact(truth));
             let name = depth.map_or(format!("{truth}"), |d| format!("{truth} to depth {d}"));
             rows.push(self.row(own, kind, Some((name, comparison))));
         };
@@ -157,7 +157,7 @@ impl Session<'_> {
             against,
             spp: own.spp,
             seconds: own.seconds,
-            half_width: Picture::Rendered(&own.image, kind).half_width(),
+            half_width: own.picture().half_width(),
             required: self.effort.limits(kind).required,
             dropped: own.image.counters.non_finite + own.image.counters.negative,
             comparison,

@@ -1,6 +1,6 @@
 //! What is known of a picture: means with their errors.
 
-use renderer::film::{ERROR_BLOCK, MergedImage};
+use renderer::film::{ERROR_BLOCK, Filter, MergedImage};
 use renderer::integrator::IntegratorKind;
 use statcheck::Estimate;
 
@@ -11,7 +11,7 @@ const REACH: u32 = 2;
 #[derive(Clone, Copy, Debug)]
 pub enum Picture<'a> {
     /// What an integrator estimates.
-    Rendered(&'a MergedImage, IntegratorKind),
+    Rendered(&'a MergedImage, IntegratorKind, &'a Filter),
     /// The same radiance in every pixel, known exactly.
     Exact(f64),
 }
@@ -49,12 +49,12 @@ impl Area {
 impl Picture<'_> {
     /// The mean over the image or one of its blocks.
     ///
-    /// No two pixels of a path tracer share a sample: its pixels' errors add up. Those of splatted pixels don't; there the scatter of
-    /// the whole area between the replicate groups tells the error.
+    /// Pixels of a path tracer share samples in a way that the filter tells: their errors add up to the area's. Those of splatted pixels
+    /// don't; there the scatter of the whole area between the replicate groups tells the error.
     pub fn area(&self, area: Area, channel: usize) -> Estimate {
-        let (image, kind) = match *self {
+        let (image, kind, filter) = match *self {
             Self::Exact(radiance) => return Estimate::exact(radiance),
-            Self::Rendered(image, kind) => (image, kind),
+            Self::Rendered(image, kind, filter) => (image, kind, filter),
         };
         let pixels = || area.pixels(image.width);
         let mean = pixels().map(|i| f64::from(image.mean[i][channel])).sum::<f64>() / pixels().count() as f64;
@@ -62,7 +62,9 @@ impl Picture<'_> {
         let square = |e: f64| e * e;
         if kind == IntegratorKind::Path {
             let variances = pixels().map(|i| square(f64::from(image.std_error[i][channel])));
-            return Estimate::pooled(mean, variances, dof, 1.0);
+            let [x, y] = [0, 1].map(|axis| area.from[axis]..area.to[axis]);
+            let inflation = if filter.shares() { filter.inflation(0, &x) * filter.inflation(1, &y) } else { 1.0 };
+            return Estimate::pooled(mean, variances, dof, inflation);
         }
         let error = if area == Area::whole(image) {
             image.blocks.image.map_or(f64::NAN, |m| m.std_error[channel])
@@ -80,7 +82,7 @@ impl Picture<'_> {
     pub fn pixel(&self, i: usize, channel: usize) -> Estimate {
         let image = match *self {
             Self::Exact(radiance) => return Estimate::exact(radiance),
-            Self::Rendered(image, _) => image,
+            Self::Rendered(image, ..) => image,
         };
         let (x, y) = (i as u32 % image.width, i as u32 / image.width);
         let around = Area {
@@ -96,7 +98,7 @@ impl Picture<'_> {
     pub fn half_width(&self) -> f64 {
         match *self {
             Self::Exact(_) => 0.0,
-            Self::Rendered(image, _) => (0..3)
+            Self::Rendered(image, ..) => (0..3)
                 .map(|c| self.area(Area::whole(image), c))
                 .map(|e| if e.variance.is_finite() { e.half_width(0.99) / e.mean } else { f64::NAN })
                 .fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) }),
@@ -106,7 +108,7 @@ impl Picture<'_> {
     fn dof(&self) -> f64 {
         match self {
             Self::Exact(_) => f64::INFINITY,
-            Self::Rendered(image, _) => image.error.map_or(f64::NAN, |e| f64::from(e.groups) - 1.0),
+            Self::Rendered(image, ..) => image.error.map_or(f64::NAN, |e| f64::from(e.groups) - 1.0),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Rendering until the image mean is known well enough.
 
 use super::picture::Picture;
-use renderer::film::MergedImage;
+use renderer::film::{Filter, MergedImage};
 use renderer::integrator::IntegratorKind;
 use renderer::job::{LocalOptions, RenderOptions, RenderSettings, Stop, render_local};
 use renderer::scene::Scene;
@@ -46,10 +46,21 @@ impl Effort {
 pub struct Rendering {
     /// The picture.
     pub image: MergedImage,
+    /// What made it.
+    pub kind: IntegratorKind,
+    /// How its pixels share samples.
+    pub filter: Filter,
     /// Samples (mutations) per pixel.
     pub spp: u32,
     /// Seconds, the pilot not counted.
     pub seconds: f64,
+}
+
+impl Rendering {
+    /// As something to compare.
+    pub fn picture(&self) -> Picture<'_> {
+        Picture::Rendered(&self.image, self.kind, &self.filter)
+    }
 }
 
 /// What to render.
@@ -75,7 +86,7 @@ impl Task<'_> {
     /// The pilot is thrown away: samples that decide how many more there will be would bias the picture.
     pub fn run(&self, effort: &Effort) -> Result<Rendering, String> {
         let pilot = self.render(effort.pilot_spp, !self.seed)?;
-        let half = Picture::Rendered(&pilot.image, self.kind).half_width();
+        let half = pilot.picture().half_width();
         let rays_per_spp = pilot.image.counters.rays as f64 / f64::from(effort.pilot_spp);
         let needed = f64::from(effort.pilot_spp) * (half / effort.aim) * (half / effort.aim);
         // NaN, where the pilot could not tell, takes all that is allowed.
@@ -101,6 +112,7 @@ impl Task<'_> {
         let options = LocalOptions { threads: self.threads };
         let outcome =
             render_local(self.scene, &settings, &options, &Stop::new(), &mut |_| {}).map_err(|e| e.to_string())?;
-        Ok(Rendering { image: outcome.image, spp, seconds: started.elapsed().as_secs_f64() })
+        let filter = Filter::new(&settings.filter, settings.width, settings.height);
+        Ok(Rendering { image: outcome.image, kind: self.kind, filter, spp, seconds: started.elapsed().as_secs_f64() })
     }
 }

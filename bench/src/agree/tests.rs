@@ -1,8 +1,9 @@
 use super::picture::Area;
 use super::render::{Effort, Limits, Rendering, Task};
 use super::*;
-use renderer::film::MergedImage;
+use renderer::film::{Filter, MergedImage};
 use renderer::integrator::IntegratorKind::{Light, Path};
+use renderer::scene::desc::FilterDesc;
 use std::path::Path as FilePath;
 
 /// More tests than any run makes, so that what is rejected here is rejected there.
@@ -20,8 +21,14 @@ fn rendered(scene: &Scene, kind: IntegratorKind, seed: u64, spp: u32) -> Renderi
     Task { scene, kind, size: (64, 48), max_depth: None, seed, threads: 2 }.run(&effort).unwrap()
 }
 
+/// The filter of scenes that name none.
+fn filter(image: &MergedImage) -> Filter {
+    Filter::new(&FilterDesc::Gaussian { stddev: 0.5 }, image.width, image.height)
+}
+
 fn agrees(image: &MergedImage, kind: IntegratorKind, other: &Picture<'_>) -> bool {
-    compare(image, &Picture::Rendered(image, kind), other).agrees(statcheck::sidak(compare::FAMILY, TESTS))
+    compare(image, &Picture::Rendered(image, kind, &filter(image)), other)
+        .agrees(statcheck::sidak(compare::FAMILY, TESTS))
 }
 
 /// The picture with some of its pixels brighter or darker, its error as it was.
@@ -37,7 +44,8 @@ fn scaled(image: &MergedImage, area: Area, factor: f32) -> MergedImage {
 fn a_wrong_picture_is_told_from_a_right_one() {
     let scene = case("directional").load().unwrap();
     let path = rendered(&scene, Path, 1, 256).image;
-    let reference = Picture::Rendered(&path, Path);
+    let filter = filter(&path);
+    let reference = Picture::Rendered(&path, Path, &filter);
     for (kind, spp) in [(Path, 256), (Light, 1024)] {
         let own = rendered(&scene, kind, 2, spp).image;
         assert!(agrees(&own, kind, &reference), "{kind:?}");
@@ -58,13 +66,14 @@ fn single_pixels_are_tested_too() {
     let scene = case("directional").load().unwrap();
     let path = rendered(&scene, Path, 1, 256).image;
     let mut wrong = rendered(&scene, Path, 2, 256).image;
-    let reference = Picture::Rendered(&path, Path);
+    let filter = filter(&path);
+    let reference = Picture::Rendered(&path, Path, &filter);
     // A fault that every block's mean hides: each second pixel too bright by as much as the next is too dark.
     for (i, v) in wrong.mean.iter_mut().enumerate() {
         let factor = if i % 2 == 0 { 1.5 } else { 0.5 };
         v.iter_mut().for_each(|v| *v *= factor);
     }
-    let comparison = compare(&wrong, &Picture::Rendered(&wrong, Path), &reference);
+    let comparison = compare(&wrong, &Picture::Rendered(&wrong, Path, &filter), &reference);
     assert!(comparison.pixels < compare::PIXEL_SHARE, "{comparison:?}");
 }
 

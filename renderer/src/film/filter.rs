@@ -85,6 +85,41 @@ impl Filter {
         self.radius
     }
 
+    /// Whether a sample counts for the pixels around its own too. (Samples of a filter that is no wider than a pixel are drawn by
+    /// [`Filter::sample`] and count for their own.)
+    #[inline]
+    pub fn shares(&self) -> bool {
+        self.radius > 0.5
+    }
+
+    /// How many pixels further than its own a sample counts.
+    #[inline]
+    pub fn reach(&self) -> u32 {
+        if self.shares() { (self.radius + 0.5).floor() as u32 } else { 0 }
+    }
+
+    /// How much larger the variance of the mean over `pixels` is than the mean of the pixels' variances over their number, along one
+    /// axis (0 = x, 1 = y), where pixels share samples: the integral of the squared sum of their filters, over the sum of the integrals of
+    /// their squares.
+    pub fn inflation(&self, axis: usize, pixels: &std::ops::Range<u32>) -> f64 {
+        const STEPS: u32 = 32;
+        let reach = self.radius.ceil() as u32;
+        let (first, last) = (pixels.start.saturating_sub(reach), pixels.end + reach);
+        let (mut joint, mut single) = (0.0, 0.0);
+        for i in first * STEPS..last * STEPS {
+            let mut weights = [0.0; MAX_FOOTPRINT];
+            let (from, count) = self.weights_axis((i as f32 + 0.5) / STEPS as f32, self.size[axis], &mut weights);
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for (_, w) in (from..).zip(&weights[..count]).filter(|(p, _)| pixels.contains(p)) {
+                sum += f64::from(*w);
+                squares += f64::from(*w) * f64::from(*w);
+            }
+            joint += sum * sum;
+            single += squares;
+        }
+        if single > 0.0 { joint / single } else { 1.0 }
+    }
+
     /// A raster position with density `h` of the pixel (x, y) of the picture, by `u` in [0, 1)^2.
     #[inline]
     pub fn sample(&self, u: Vec2, x: u32, y: u32) -> Vec2 {

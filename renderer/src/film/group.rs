@@ -2,7 +2,7 @@ use super::{SplatSums, TileSums};
 
 /// The film of one replicate group: a complete, independent estimate of the image.
 ///
-/// Open, it holds f64 sums (28 bytes a pixel of tiles, 24 of splats, 52 of both); closed, the mean in f32 (12 bytes a pixel). Where
+/// Open, it holds f64 sums (36 bytes a pixel of tiles, 24 of splats, 60 of both); closed, the mean in f32 (12 bytes a pixel). Where
 /// samples are the budget, one group is open at a time; where time or error is, all are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GroupFilm {
@@ -12,7 +12,9 @@ pub enum GroupFilm {
     Open {
         /// Sums of tile samples, already in units of radiance times samples.
         sums: Vec<[f64; 3]>,
-        /// Tile samples of each pixel.
+        /// Sums of their weights.
+        weights: Vec<f64>,
+        /// Tile samples that were taken of each pixel.
         samples: Vec<u32>,
         /// Sums of splats.
         splats: Vec<[f64; 3]>,
@@ -35,15 +37,17 @@ impl GroupFilm {
         if matches!(self, Self::Empty) {
             *self = Self::Open {
                 sums: Vec::new(),
+                weights: Vec::new(),
                 samples: Vec::new(),
                 splats: Vec::new(),
                 splat_weight: 0.0,
                 awaits_splats: false,
             };
         }
-        if let Self::Open { sums, samples, splats, .. } = self {
+        if let Self::Open { sums, weights, samples, splats, .. } = self {
             if tiles && sums.is_empty() {
                 *sums = vec![[0.0; 3]; pixels];
+                *weights = vec![0.0; pixels];
                 *samples = vec![0; pixels];
             }
             if splat && splats.is_empty() {
@@ -55,13 +59,16 @@ impl GroupFilm {
     /// Adds a tile; the tile must lie on the film of `width * height` pixels.
     pub fn add_tile(&mut self, width: u32, height: u32, tile: &TileSums) {
         self.open(width as usize * height as usize, true, false);
-        let Self::Open { sums, samples, .. } = self else { return };
-        for ((x, y), v) in tile.rect.pixels().zip(&tile.sums) {
+        let Self::Open { sums, weights, samples, .. } = self else { return };
+        for (((x, y), v), w) in tile.covered.pixels().zip(&tile.sums).zip(&tile.weights) {
             let i = y as usize * width as usize + x as usize;
             for (to, from) in sums[i].iter_mut().zip(v.to_array()) {
                 *to += f64::from(from);
             }
-            samples[i] += tile.samples;
+            weights[i] += f64::from(*w);
+        }
+        for (x, y) in tile.rect.pixels() {
+            samples[y as usize * width as usize + x as usize] += tile.samples;
         }
     }
 
@@ -118,11 +125,11 @@ impl GroupFilm {
             Self::Empty => ([0.0; 3], 0.0),
             Self::Closed { mean, weight } => (mean[i].map(f64::from), *weight),
             Self::Open { awaits_splats: true, .. } => ([0.0; 3], 0.0),
-            Self::Open { sums, samples, splats, splat_weight, .. } => {
+            Self::Open { sums, weights, samples, splats, splat_weight, .. } => {
                 let n = samples.get(i).copied().map_or(0.0, f64::from);
                 let mut mean = [0.0; 3];
-                if n > 0.0 {
-                    mean = sums[i].map(|v| v / n);
+                if n > 0.0 && weights[i] > 0.0 {
+                    mean = sums[i].map(|v| v / weights[i]);
                 }
                 if *splat_weight > 0.0 {
                     for c in 0..3 {
@@ -155,9 +162,10 @@ impl GroupFilm {
         }
         match self {
             Self::Empty => out.push(0),
-            Self::Open { sums, samples, splats, splat_weight, awaits_splats } => {
+            Self::Open { sums, weights, samples, splats, splat_weight, awaits_splats } => {
                 out.push(1);
                 array(out, sums);
+                array(out, weights);
                 array(out, samples);
                 array(out, splats);
                 out.extend(splat_weight.to_le_bytes());
@@ -190,6 +198,7 @@ impl GroupFilm {
             [0] => Self::Empty,
             [1] => Self::Open {
                 sums: array(bytes, pixels)?,
+                weights: array(bytes, pixels)?,
                 samples: array(bytes, pixels)?,
                 splats: array(bytes, pixels)?,
                 splat_weight: f64::from_bits(word(bytes)?),

@@ -31,6 +31,22 @@ impl Rect {
         self.width() as usize * self.height() as usize
     }
 
+    /// The rectangle with `margin` pixels more on each side, as far as they lie on a film of `width * height` pixels.
+    pub fn grown(&self, margin: u32, width: u32, height: u32) -> Self {
+        Self {
+            x0: self.x0.saturating_sub(margin),
+            y0: self.y0.saturating_sub(margin),
+            x1: self.x1.saturating_add(margin).min(width),
+            y1: self.y1.saturating_add(margin).min(height),
+        }
+    }
+
+    /// Whether pixel (x, y) is one of it.
+    #[inline]
+    pub fn contains(&self, x: u32, y: u32) -> bool {
+        (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
+    }
+
     /// The pixels, row by row.
     pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let r = *self;
@@ -79,10 +95,14 @@ impl Aov {
 pub struct TileSums {
     /// The tile.
     pub rect: Rect,
-    /// Samples per pixel that were taken.
+    /// The pixels that its samples count for: those of the tile, and as many around as the filter reaches.
+    pub covered: Rect,
+    /// Samples of each pixel of the tile that were taken.
     pub samples: u32,
-    /// Sums of radiance, row by row; rounded once from f64.
+    /// Sums of radiance times weight over `covered`, row by row; rounded once from f64.
     pub sums: Vec<Rgb>,
+    /// Sums of the weights over `covered`: of all tiles together, about as much as a pixel has samples.
+    pub weights: Vec<f32>,
     /// Sums of the auxiliary values, row by row; empty for all replicates but the first.
     pub aovs: Vec<Aov>,
 }

@@ -62,10 +62,9 @@ impl<'a> UnitContext<'a> {
         }
     }
 
-    /// The camera ray of a sample of pixel (x, y), by the sampler's first numbers.
+    /// The camera ray through a raster position, by the sampler's next numbers.
     #[inline]
-    pub fn camera_ray(&self, sampler: &mut impl Sampler, x: u32, y: u32) -> Ray {
-        let raster = self.view.filter.sample(sampler.next_2d(), x, y);
+    pub fn camera_ray(&self, sampler: &mut impl Sampler, raster: Vec2) -> Ray {
         let lens = if self.view.camera.is_pinhole() { Vec2::ZERO } else { sampler.next_2d() };
         self.view.camera.generate_ray(raster, lens)
     }

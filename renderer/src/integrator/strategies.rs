@@ -4,7 +4,7 @@
 use super::UnitContext;
 use super::bdpt::{Bidirectional, Sink};
 use crate::path::Connection;
-use crate::sampling::{SobolSampler, hash_words};
+use crate::sampling::{Sampler, SobolSampler, hash_words};
 use std::ops::Range;
 
 /// Edges of the longest path that is told apart.
@@ -51,7 +51,8 @@ impl Strategies {
                 for index in samples.clone() {
                     let mut camera = SobolSampler::new(c.seed, c.replicate, pixel, index);
                     let mut light = SobolSampler::new(c.seed, c.replicate, hash_words(&[pixel]), index);
-                    let ray = c.camera_ray(&mut camera, x, y);
+                    let raster = c.view.filter.sample(camera.next_2d(), x, y);
+                    let ray = c.camera_ray(&mut camera, raster);
                     bdpt.sample(ray, &mut camera, &mut light, &mut Film { c, sums: &mut sums, at: pixel as usize });
                 }
             }

@@ -1,8 +1,8 @@
 use super::UnitContext;
-use crate::film::{Aov, Rect, TileSums};
-use crate::math::{Anchor, Ray};
+use crate::film::{Aov, Filter, Rect, TileSums};
+use crate::math::{Anchor, Ray, Vec2};
 use crate::path::Scattering;
-use crate::sampling::SobolSampler;
+use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
@@ -21,36 +21,92 @@ pub struct PixelSample<'a> {
 }
 
 /// Sums what `radiance` makes of samples `samples` of each pixel of a tile; `None` when stopped.
+///
+/// A sample lies anywhere in its pixel and counts for every pixel whose filter covers it; a pixel is the weighted mean of what counts
+/// for it. Its variance is that of a sample times the integral of the squared filter (4/9 for a tent, 1/pi for a Gaussian of standard
+/// deviation 0.5) where drawing positions from the filter (Ernst, Stamminger and Greiner 2006, "Filter Importance Sampling") has all of
+/// it. Weights do not depend on radiance, so that the expectation is a filtered image still.
 pub fn render(
     c: &UnitContext<'_>,
     rect: Rect,
     samples: Range<u32>,
     mut radiance: impl FnMut(PixelSample<'_>) -> Rgb,
 ) -> Option<TileSums> {
-    let mut sums = Vec::with_capacity(rect.area());
+    let filter = &c.view.filter;
+    let mut sums = Sums::new(filter, rect, (c.view.width, c.view.height));
     let mut aovs = Vec::with_capacity(if c.replicate == 0 { rect.area() } else { 0 });
     for (x, y) in rect.pixels() {
         if x == rect.x0 && (c.stopped)() {
             return None;
         }
-        let mut sum = [0.0f64; 3];
         let mut aov = Aov::default();
         let pixel = u64::from(y) * u64::from(c.view.width) + u64::from(x);
         for index in samples.clone() {
             let mut sampler = SobolSampler::new(c.seed, c.replicate, pixel, index);
-            let ray = c.camera_ray(&mut sampler, x, y);
+            let u = sampler.next_2d();
+            let raster = if filter.shares() { inside(x, y, u) } else { filter.sample(u, x, y) };
+            let ray = c.camera_ray(&mut sampler, raster);
             let aov = (c.replicate == 0).then_some(&mut aov);
             let value = radiance(PixelSample { pixel, index, sampler, ray, aov });
-            for (to, from) in sum.iter_mut().zip(value.to_array()) {
-                *to += f64::from(from);
+            if filter.shares() {
+                sums.spread(raster, value);
+            } else {
+                sums.add(x, y, 1.0, value);
             }
         }
-        sums.push(Rgb::from(sum.map(|v| v as f32)));
         if c.replicate == 0 {
             aovs.push(aov);
         }
     }
-    Some(TileSums { rect, samples: samples.end - samples.start, sums, aovs })
+    Some(sums.finish(samples.end - samples.start, aovs))
+}
+
+/// A place in pixel (x, y); rounding must not lead into the next.
+#[inline]
+fn inside(x: u32, y: u32, u: Vec2) -> Vec2 {
+    let (x, y) = (x as f32, y as f32);
+    Vec2::new((x + u.x).min((x + 1.0).next_down()), (y + u.y).min((y + 1.0).next_down()))
+}
+
+/// What the samples of a tile add up to in the pixels for which they count.
+struct Sums<'a> {
+    filter: &'a Filter,
+    rect: Rect,
+    covered: Rect,
+    /// Sums of weighted radiance and of weights over `covered`.
+    sums: Vec<[f64; 4]>,
+}
+
+impl<'a> Sums<'a> {
+    fn new(filter: &'a Filter, rect: Rect, (width, height): (u32, u32)) -> Self {
+        let covered = rect.grown(filter.reach(), width, height);
+        Self { filter, rect, covered, sums: vec![[0.0; 4]; covered.area()] }
+    }
+
+    /// Adds a sample to all pixels whose filter covers it.
+    #[inline]
+    fn spread(&mut self, raster: Vec2, value: Rgb) {
+        for (x, y, weight) in self.filter.weights(raster).iter() {
+            self.add(x, y, weight, value);
+        }
+    }
+
+    #[inline]
+    fn add(&mut self, x: u32, y: u32, weight: f32, value: Rgb) {
+        let place = (y - self.covered.y0) * self.covered.width() + x - self.covered.x0;
+        let to = &mut self.sums[place as usize];
+        let weight = f64::from(weight);
+        to[0] += weight * f64::from(value.r);
+        to[1] += weight * f64::from(value.g);
+        to[2] += weight * f64::from(value.b);
+        to[3] += weight;
+    }
+
+    fn finish(self, samples: u32, aovs: Vec<Aov>) -> TileSums {
+        let weights = self.sums.iter().map(|s| s[3] as f32).collect();
+        let sums = self.sums.iter().map(|s| Rgb::new(s[0] as f32, s[1] as f32, s[2] as f32)).collect();
+        TileSums { rect: self.rect, covered: self.covered, samples, sums, weights, aovs }
+    }
 }
 
 /// What the first vertex of a path, at `at`, shows in the auxiliary images of a camera at `lens`.

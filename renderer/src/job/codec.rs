@@ -8,7 +8,7 @@ use crate::integrator::mmlt::{BootstrapSums, ChainStats, Found};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
-const MAGIC: &[u8; 4] = b"LFU2";
+const MAGIC: &[u8; 4] = b"LFU3";
 const BLOCK_FLOATS: usize = (BLOCK * BLOCK) as usize * 3;
 /// Edges of the longest path that chains carry, at most.
 const MAX_EDGES: u32 = 255;
@@ -41,6 +41,7 @@ impl UnitResult {
         let mut floats: Vec<f32> = Vec::new();
         if let Some(tile) = &self.tile {
             floats.extend_from_slice(bytemuck::cast_slice(&tile.sums));
+            floats.extend_from_slice(&tile.weights);
             floats.extend_from_slice(bytemuck::cast_slice(&tile.aovs));
         }
         for (block, sums) in self.splats.iter().flat_map(SplatSums::blocks) {
@@ -110,12 +111,14 @@ impl UnitResult {
         }
         let (tile, splatted) = floats.split_at(of_tile);
         let mut result = Self { paths, light_sums, bootstrap, chains, counters, ..Self::default() };
-        if let UnitKind::Tile { rect, start, end } = &unit.kind {
-            let (sums, aovs) = tile.split_at(rect.area() * 3);
+        if let UnitKind::Tile { rect, covered, start, end } = &unit.kind {
+            let (sums, rest) = tile.split_at(covered.area() * 3);
+            let (weights, aovs) = rest.split_at(covered.area());
+            let weights = weights.to_vec();
             let sums = sums.chunks_exact(3).map(|v| Rgb::new(v[0], v[1], v[2])).collect();
             let aovs =
                 aovs.chunks_exact(AOV_FLOATS).map(|v| bytemuck::pod_read_unaligned(bytemuck::cast_slice(v))).collect();
-            result.tile = Some(TileSums { rect: *rect, samples: end - start, sums, aovs });
+            result.tile = Some(TileSums { rect: *rect, covered: *covered, samples: end - start, sums, weights, aovs });
         }
         if splats {
             let mut splats = empty;
@@ -134,7 +137,9 @@ impl UnitResult {
 /// Floats of the tile that a unit renders.
 fn of_tile(unit: &Unit) -> usize {
     match &unit.kind {
-        UnitKind::Tile { rect, .. } => rect.area() * if unit.replicate == 0 { 3 + AOV_FLOATS } else { 3 },
+        UnitKind::Tile { rect, covered, .. } => {
+            4 * covered.area() + if unit.replicate == 0 { AOV_FLOATS * rect.area() } else { 0 }
+        }
         UnitKind::Paths { .. } | UnitKind::Bootstrap { .. } | UnitKind::Chains { .. } => 0,
     }
 }

@@ -127,10 +127,12 @@ impl Merger {
         let group = &mut self.groups[unit.replicate as usize];
         let fits = |splats: &SplatSums| splats.size() == (w, h);
         match (&unit.kind, &result.tile, &result.splats) {
-            (UnitKind::Tile { rect, start, end }, Some(tile), splats)
+            (UnitKind::Tile { rect, covered, start, end }, Some(tile), splats)
                 if tile.rect == *rect
+                    && tile.covered == *covered
                     && tile.samples == end - start
-                    && tile.sums.len() == rect.area()
+                    && tile.sums.len() == covered.area()
+                    && tile.weights.len() == covered.area()
                     && tile.aovs.len() == if unit.replicate == 0 { rect.area() } else { 0 }
                     && splats.is_some() == (self.plan.sampling == Sampling::SplattingTiles)
                     && splats.as_ref().is_none_or(fits) =>

@@ -118,6 +118,8 @@ pub struct PassPlan {
     pub width: u32,
     /// Film height in pixels.
     pub height: u32,
+    /// Pixels beyond a tile for which its samples count.
+    pub reach: u32,
     /// What units of samples are.
     pub sampling: Sampling,
     /// What is done, in the order of the units.
@@ -246,7 +248,8 @@ impl PassPlan {
                 let (x0, y0) = (tile % across * side, tile / across * side);
                 let rect = Rect { x0, y0, x1: (x0 + side).min(self.width), y1: (y0 + side).min(self.height) };
                 let start = g.start + chunk * SAMPLE_CHUNK;
-                UnitKind::Tile { rect, start, end: (start + SAMPLE_CHUNK).min(g.end) }
+                let covered = rect.grown(self.reach, self.width, self.height);
+                UnitKind::Tile { rect, covered, start, end: (start + SAMPLE_CHUNK).min(g.end) }
             }
             Part::Bootstrap { samples, .. } => {
                 let start = i as u32 * UNIT_BOOTSTRAP;
@@ -376,6 +379,7 @@ impl Planner {
             pass,
             width: self.settings.width,
             height: self.settings.height,
+            reach: self.settings.reach(),
             sampling: self.sampling(),
             parts: groups.into_iter().map(Part::Samples).collect(),
             light_weights: learned.light_weights,

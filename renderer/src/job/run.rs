@@ -108,7 +108,7 @@ fn run(
     };
     let mut result = UnitResult::default();
     let done = match unit.kind {
-        UnitKind::Tile { rect, start, end } => run_tile(&context, plan, rect, start..end, &mut result),
+        UnitKind::Tile { rect, start, end, .. } => run_tile(&context, plan, rect, start..end, &mut result),
         UnitKind::Paths { start, end } => {
             let mut splats = SplatSums::new(settings.width, settings.height);
             let sums = integrator::light::trace_paths(&context, start..end, &mut splats, &mut result.counters);

@@ -1,3 +1,4 @@
+use crate::film::Filter;
 use crate::film::exr::Provenance;
 use crate::integrator::IntegratorKind;
 use crate::integrator::mmlt::MmltOptions;
@@ -136,6 +137,11 @@ impl RenderSettings {
         };
         settings.validate()?;
         Ok(settings)
+    }
+
+    /// Pixels beyond its own for which a sample counts.
+    pub fn reach(&self) -> u32 {
+        Filter::new(&self.filter, self.width, self.height).reach()
     }
 
     /// What an image made with these settings says of itself.

@@ -24,6 +24,8 @@ pub enum UnitKind {
     Tile {
         /// The tile.
         rect: Rect,
+        /// The pixels that its samples count for.
+        covered: Rect,
         /// First sample index.
         start: u32,
         /// One past the last.
@@ -76,7 +78,10 @@ pub struct UnitResult {
 impl UnitResult {
     /// Bytes of memory that its sums take, about.
     pub fn memory(&self) -> usize {
-        let tile = self.tile.as_ref().map_or(0, |t| size_of_val(&t.sums[..]) + size_of_val(&t.aovs[..]));
+        let tile = self
+            .tile
+            .as_ref()
+            .map_or(0, |t| size_of_val(&t.sums[..]) + size_of_val(&t.weights[..]) + size_of_val(&t.aovs[..]));
         let splats = self.splats.as_ref().map_or(0, SplatSums::memory);
         let found = self.bootstrap.as_ref().map_or(0, |b| size_of_val(&b.found[..]));
         tile + splats + found

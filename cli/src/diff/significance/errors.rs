@@ -3,8 +3,8 @@
 use super::CHANNELS;
 use renderer::film::exr::Picture;
 use renderer::film::{ChannelMeans, Filter};
-use renderer::math::Vec2;
 use renderer::scene::desc::FilterDesc;
+use serde::Deserialize;
 use statcheck::Estimate;
 use std::ops::Range;
 
@@ -17,12 +17,21 @@ pub struct Assumptions {
     pub filter: Option<FilterDesc>,
 }
 
+/// The filter of pixels that share nothing.
+const PIXEL: FilterDesc = FilterDesc::Box { radius: 0.5 };
+
+/// The filter by which the pixels of one of our own pictures share samples.
+fn shared(desc: FilterDesc, p: &Picture) -> Filter {
+    let filter = Filter::new(&desc, p.width, p.height);
+    if filter.shares() { filter } else { Filter::new(&PIXEL, p.width, p.height) }
+}
+
 /// What a file knows of its error.
 pub(super) enum Errors {
     /// Standard errors of blocks (at each pixel) and of the image, from groups.
     Groups { block: Vec<[f32; 3]>, image: ChannelMeans },
     /// Variance of each pixel; how much larger the variance of a block's mean is than that of independent pixels, by axis.
-    Pixels { variance: Vec<[f32; 3]>, dof: f64, filter: [Filter; 2], name: String },
+    Pixels { variance: Vec<[f32; 3]>, dof: f64, filter: Filter, name: String },
 }
 
 impl Errors {
@@ -32,27 +41,28 @@ impl Errors {
             p.triple([&names[0], &names[1], &names[2]])
         };
         let square = |v: Vec<[f32; 3]>| v.into_iter().map(|p| p.map(|s| s * s)).collect();
-        let own = p.metadata.as_ref().and_then(|m| m.channels.map(|image| (image, &m.settings["integrator"])));
+        let own = p.metadata.as_ref().and_then(|m| {
+            let filter = FilterDesc::deserialize(&m.settings["filter"]).ok();
+            m.channels.map(|image| (image, &m.settings["integrator"], filter))
+        });
         match (own, layer("blockerror"), layer("stderror")) {
-            // No two pixels of a path tracer share a sample: hundreds of pixel errors tell a block's error better than its own few
-            // groups do, whose chance of being far too small the t-test of two images underrates.
-            (Some((image, kind)), _, Some(errors)) if kind == "path" => {
-                let pixel = FilterDesc::Box { radius: 0.5 };
-                let filter = [Filter::new(&pixel, p.width, 1), Filter::new(&pixel, p.height, 1)];
+            // Pixels of a path tracer share samples in a known way, if at all: hundreds of pixel errors tell a block's error better
+            // than its own few groups do, whose chance of being far too small the t-test of two images underrates.
+            (Some((image, kind, own)), _, Some(errors)) if kind == "path" => {
+                let filter = shared(own.unwrap_or(PIXEL), p);
                 let name = format!("pixel errors of {} replicate groups", image.groups);
                 let dof = f64::from(image.groups) - 1.0;
                 return Some(Self::Pixels { variance: square(errors), dof, filter, name });
             }
-            (Some((image, _)), Some(block), _) => return Some(Self::Groups { block, image }),
+            (Some((image, ..)), Some(block), _) => return Some(Self::Groups { block, image }),
             _ => {}
         }
         let variance = layer("variance").or_else(|| layer("stderror").map(square))?;
         let (desc, name) = match assume.filter {
             Some(f) => (f, filter_name(&f)),
-            None => filter_of_comments(&p.comments)
-                .map_or((FilterDesc::Box { radius: 0.5 }, "box"), |f| (f, filter_name(&f))),
+            None => filter_of_comments(&p.comments).map_or((PIXEL, "box"), |f| (f, filter_name(&f))),
         };
-        let filter = [Filter::new(&desc, p.width, 1), Filter::new(&desc, p.height, 1)];
+        let filter = Filter::new(&desc, p.width, p.height);
         let name = format!("pixel variances of {} images, {name} filter", assume.replicates);
         Some(Self::Pixels { variance, dof: f64::from(assume.replicates) - 1.0, filter, name })
     }
@@ -73,7 +83,7 @@ impl Errors {
             }
             Self::Pixels { variance, dof, filter, .. } => {
                 let pixels = y.clone().flat_map(|y| x.clone().map(move |x| (y * width + x) as usize));
-                let inflation = inflation(&filter[0], x) * inflation(&filter[1], y);
+                let inflation = filter.inflation(0, x) * filter.inflation(1, y);
                 Estimate::pooled(mean, pixels.map(|i| f64::from(variance[i][c])), *dof, inflation)
             }
         }
@@ -89,27 +99,6 @@ impl Errors {
             Self::Pixels { .. } => self.block(mean, width, &(0..width), &(0..height), c),
         }
     }
-}
-
-/// How much larger the variance of the mean over `pixels` is than the mean of the pixels' variances over their number, along one axis:
-/// the integral of the squared sum of their filters, over the sum of the integrals of their squares.
-fn inflation(filter: &Filter, pixels: &Range<u32>) -> f64 {
-    const STEPS: u32 = 32;
-    let reach = filter.radius().ceil() as u32;
-    let (first, last) = (pixels.start.saturating_sub(reach), pixels.end + reach);
-    let (mut joint, mut single) = (0.0, 0.0);
-    for i in first * STEPS..last * STEPS {
-        let at = Vec2::new((i as f32 + 0.5) / STEPS as f32, 0.5);
-        let weights = || filter.weights(at);
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for (_, _, w) in weights().iter().filter(|(x, _, _)| pixels.contains(x)) {
-            sum += f64::from(w);
-            squares += f64::from(w) * f64::from(w);
-        }
-        joint += sum * sum;
-        single += squares;
-    }
-    if single > 0.0 { joint / single } else { 1.0 }
 }
 
 fn filter_name(f: &FilterDesc) -> &'static str {

@@ -33,7 +33,11 @@ fn with_groups(seed: u64, scale: f32) -> Picture {
     let mut film = || {
         let sums = (0..PIXELS).map(|_| Rgb::from(noise.sample(scale))).collect();
         let mut film = GroupFilm::Empty;
-        film.add_tile(SIDE, SIDE, &TileSums { rect, samples: 1, sums, aovs: Vec::new() });
+        film.add_tile(
+            SIDE,
+            SIDE,
+            &TileSums { rect, covered: rect, samples: 1, sums, weights: vec![1.0; rect.area()], aovs: Vec::new() },
+        );
         film
     };
     let films: Vec<GroupFilm> = (0..8).map(|_| film()).collect();

@@ -115,6 +115,7 @@ fn plan(
         pass,
         width: settings.width,
         height: settings.height,
+        reach: settings.reach(),
         sampling: Sampling::Tiles,
         parts,
         light_weights: Vec::new(),
