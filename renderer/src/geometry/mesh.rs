@@ -1,4 +1,5 @@
 use crate::math::{Vec2, Vec3};
+use std::collections::HashMap;
 
 /// An indexed triangle mesh in object space.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,5 +63,54 @@ impl Mesh {
             }
         }
         Ok(())
+    }
+
+    /// Whether the surface has no border: no edge belongs to an odd number of triangles. Corners at the same place are one.
+    pub fn is_closed(&self) -> bool {
+        let mut places = HashMap::new();
+        let place = |p: &Vec3| {
+            let next = places.len() as u32;
+            // Both zeros are the same place.
+            *places.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(next)
+        };
+        let places: Vec<u32> = self.positions.iter().map(place).collect();
+        let edges = self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let placed = edges.map(|edge| edge.map(|corner| places[corner as usize]));
+        let mut edges: Vec<[u32; 2]> = placed.filter(|[a, b]| a != b).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        edges.sort_unstable();
+        edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tetrahedron whose sides have corners of their own.
+    fn tetrahedron() -> Mesh {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let sides = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        Mesh {
+            positions: sides.iter().flatten().map(|i: &usize| corners[*i]).collect(),
+            triangles: (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            ..Mesh::default()
+        }
+    }
+
+    #[test]
+    fn a_surface_is_closed_unless_an_edge_has_one_side() {
+        let mut mesh = tetrahedron();
+        assert!(mesh.is_closed());
+        // Other zeros, and triangles without an area.
+        mesh.positions[0] = -Vec3::ZERO;
+        mesh.triangles.push([0, 0, 5]);
+        mesh.triangles.push([1, 1, 1]);
+        assert!(mesh.is_closed());
+        mesh.positions[4].x += f32::EPSILON;
+        assert!(!mesh.is_closed());
+        let mut open = tetrahedron();
+        open.triangles.pop();
+        assert!(!open.is_closed());
+        assert!(Mesh::default().is_closed());
     }
 }

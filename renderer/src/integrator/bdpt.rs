@@ -4,7 +4,7 @@
 use super::{UnitContext, tile};
 use crate::film::{Counters, Rect, SplatSums, TileSums};
 use crate::math::Ray;
-use crate::path::{Connection, Subpath, Tracer, VertexKind};
+use crate::path::{Always, Chance, Connection, Subpath, Tracer, VertexKind};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
 use std::ops::Range;
@@ -18,6 +18,24 @@ const CONNECTIONS: u32 = 1 << 20;
 pub trait Sink {
     /// A path that counts.
     fn add(&mut self, s: usize, t: usize, path: &Connection);
+}
+
+/// Leaves to chance what contributes less than a threshold.
+struct Roulette<'a, S> {
+    threshold: f32,
+    numbers: &'a mut S,
+}
+
+impl<S: Sampler> Chance for Roulette<'_, S> {
+    #[inline]
+    fn keep(&mut self, estimate: impl FnOnce() -> f32) -> Option<f32> {
+        let q = estimate() / self.threshold;
+        // Also where the threshold is 0.
+        if !(q < 1.0) {
+            return Some(1.0);
+        }
+        (self.numbers.next_1d() < q).then_some(q)
+    }
 }
 
 /// Makes samples: a walk from each end and all connections between them.
@@ -80,16 +98,14 @@ impl<'a> Bidirectional<'a> {
         for t in 2..=from_camera.min(self.max_depth) {
             camera_numbers.start_vertex(CONNECTIONS + t as u32);
             let (uc, u) = (camera_numbers.next_1d(), camera_numbers.next_2d());
-            let path = self.tracer.next_event(&self.camera, t, uc, u);
-            let rr = camera_numbers.next_1d();
-            self.finish(path, rr, (1, t), sink);
+            let mut chance = Roulette { threshold: self.threshold, numbers: camera_numbers };
+            let path = self.tracer.next_event(&self.camera, t, uc, u, &mut chance);
+            self.finish(path, &mut chance, (1, t), sink);
             for s in 2..=from_light.min(limit - t) {
-                let path = self.tracer.join(&self.light, s, &self.camera, t);
-                if path.is_some() {
-                    light_numbers.start_vertex(CONNECTIONS + (t * 64 + s) as u32);
-                    let rr = light_numbers.next_1d();
-                    self.finish(path, rr, (s, t), sink);
-                }
+                light_numbers.start_vertex(CONNECTIONS + (t * 64 + s) as u32);
+                let mut chance = Roulette { threshold: self.threshold, numbers: light_numbers };
+                let path = self.tracer.join(&self.light, s, &self.camera, t, &mut chance);
+                self.finish(path, &mut chance, (s, t), sink);
             }
         }
 
@@ -98,23 +114,26 @@ impl<'a> Bidirectional<'a> {
             light_numbers.start_vertex(CONNECTIONS + s as u32);
             let lens_u = self.tracer.lens_numbers(light_numbers);
             let path = self.tracer.to_lens(&self.light, s, lens_u);
-            let rr = light_numbers.next_1d();
-            self.finish(path, rr, (s, 1), sink);
+            self.finish(path, &mut Always, (s, 1), sink);
         }
     }
 
     /// Tests visibility, unless the path carries so little that it is left to chance, and hands it on.
-    fn finish(&mut self, path: Option<Connection>, u: f32, strategy: (usize, usize), sink: &mut impl Sink) {
+    fn finish(
+        &mut self,
+        path: Option<Connection>,
+        chance: &mut impl Chance,
+        strategy: (usize, usize),
+        sink: &mut impl Sink,
+    ) {
         let Some(mut path) = path else { return };
         let weighted = path.weighted();
         if weighted.is_black() {
             return;
         }
-        let q = weighted.max_component() / self.threshold;
-        if q < 1.0 && path.raster.is_none() {
-            if u >= q {
-                return;
-            }
+        // Through media it was decided before the way was followed.
+        if path.shadow.is_some() {
+            let Some(q) = chance.keep(|| weighted.max_component()) else { return };
             path.value /= q;
         }
         if self.tracer.is_free(&path) {

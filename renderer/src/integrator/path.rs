@@ -1,15 +1,18 @@
 //! Unidirectional path tracing: next-event estimation and BSDF sampling, combined by multiple importance sampling
 //! (Kajiya 1986; Veach 1997, chapter 9).
+//!
+//! In media, lamps without extent are met in two ways: from where the path scatters, and from points of its flights that are chosen
+//! near the lamp, since what a lamp gives to points chosen without regard to it has no finite variance.
 
 use super::{UnitContext, tile};
 use crate::bsdf::{ShadingPoint, Transport};
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
-use crate::math::{Anchor, Ray, Vec3};
-use crate::medium::{Channels, passing_probability};
+use crate::math::{Anchor, Ray, Vec2, Vec3};
+use crate::medium::{Channels, Equiangular, passing_probability};
 use crate::path::{MediumPoint, Scattering, power_heuristic, roulette};
 use crate::sampling::Sampler;
-use crate::scene::{Enclosures, Event};
+use crate::scene::{Enclosures, Event, Target};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
@@ -35,11 +38,14 @@ fn render<const MEDIA: bool>(
     })
 }
 
+/// Blocks of numbers for the lamps along the flights lie beyond those of all vertices.
+const LAMPS: u32 = 1 << 20;
+
 /// How the path came to where it is, for the weight of light that it runs into.
 #[derive(Clone, Copy)]
 struct Arrival {
     /// The vertex before.
-    p: Vec3,
+    from: Anchor,
     /// Density per solid angle of the direction taken there, times the probability of coming through the media since.
     pdf: f32,
     /// Whether next-event estimation could not have found the same light: the camera, or a delta lobe.
@@ -51,6 +57,8 @@ struct Leg {
     ray: Ray,
     /// What encloses the ray's origin; after the flight, its end.
     around: Enclosures,
+    /// After the flight, optical depth of the scattering media on the way.
+    tau: Rgb,
     arrival: Arrival,
 }
 
@@ -78,16 +86,22 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         let mut beta = Rgb::ONE;
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
-        let arrival = Arrival { p: camera_ray.o, pdf: 0.0, alone: true };
-        let mut leg = Leg { ray: camera_ray, around: scene.camera_enclosures, arrival };
+        let lens = Anchor::free(camera_ray.o);
+        let arrival = Arrival { from: lens, pdf: 0.0, alone: true };
+        let mut leg = Leg { ray: camera_ray, around: scene.camera_enclosures, tau: Rgb::ZERO, arrival };
         let mut edges = 0;
         while edges < self.c.max_depth {
             edges += 1;
+            if MEDIA && edges < self.c.max_depth && self.c.carried.has(edges + 1) {
+                self.sampler.start_vertex(LAMPS + edges);
+                let scattered = self.scattered_near_lamp(&leg);
+                self.add(&mut total, beta, scattered.unwrap_or(Rgb::ZERO));
+            }
             self.sampler.start_vertex(edges);
             let event = self.fly(&mut leg, &mut beta);
             let Some(here) = self.arrive(&event, &leg, beta, edges, &mut total) else { break };
             if let (1, Some(aov)) = (edges, self.aov.as_deref_mut()) {
-                aov.add(&tile::shown(&here.scattering, &Anchor::free(camera_ray.o), &here.anchor));
+                aov.add(&tile::shown(&here.scattering, &lens, &here.anchor));
             }
             if edges == self.c.max_depth {
                 break;
@@ -95,7 +109,7 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
 
             // Connect to a light.
             if !here.scattering.is_delta_only() && self.c.carried.has(edges + 1) {
-                let direct = self.next_event(&here, &leg.around);
+                let direct = self.next_event(&here, &leg);
                 self.add(&mut total, beta, direct);
             }
 
@@ -110,7 +124,7 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             }
             eta_scale *= s.eta * s.eta;
             leg.ray = here.anchor.ray(s.wi);
-            leg.arrival = Arrival { p: here.anchor.p, pdf: s.pdf, alone: s.lobe.delta };
+            leg.arrival = Arrival { from: here.anchor, pdf: s.pdf, alone: s.lobe.delta };
             if MEDIA {
                 leg.around = scene.beside(here.object, &here.anchor, s.wi, &leg.around);
             }
@@ -142,6 +156,7 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         let flight = scene.fly(&Channels::by_throughput(*beta), &leg.ray, leg.around, u, &mut self.counters.rays);
         *beta *= flight.weight;
         leg.around = flight.around;
+        leg.tau = flight.tau;
         leg.arrival.pdf *= passing_probability(flight.tau);
         flight.event
     }
@@ -209,12 +224,12 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         if radiance.is_black() || arrival.alone {
             return radiance;
         }
-        let pdf_light = self.c.selector.pmf(index as usize) * light.pdf_li(&context, arrival.p, &hit.anchor());
+        let pdf_light = self.c.selector.pmf(index as usize) * light.pdf_li(&context, arrival.from.p, &hit.anchor());
         radiance * power_heuristic(arrival.pdf, pdf_light)
     }
 
     /// Light that comes straight from a chosen light.
-    fn next_event(&mut self, here: &Here, around: &Enclosures) -> Rgb {
+    fn next_event(&mut self, here: &Here, leg: &Leg) -> Rgb {
         let scene = self.c.scene;
         let uc = self.sampler.next_1d();
         let u = self.sampler.next_2d();
@@ -233,11 +248,12 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             f * li.radiance * (cos * weight / pdf)
         };
         if MEDIA {
-            let around = scene.beside(*object, from, li.wi, around);
+            let around = scene.beside(*object, from, li.wi, &leg.around);
             let Some(through) = scene.transmission(from, &(&li).into(), around, &mut self.counters.rays) else {
                 return Rgb::ZERO;
             };
-            return weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
+            let direct = weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
+            return direct * light.position().map_or(1.0, |lamp| not_near_lamp(here, leg, lamp));
         }
         let contribution = weighted(pdf_scattering);
         if contribution.is_black() {
@@ -245,6 +261,41 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         }
         self.counters.rays += 1;
         if scene.accel.occluded(&li.shadow_ray(from)) { Rgb::ZERO } else { contribution }
+    }
+
+    /// Light of a lamp without extent that is scattered once into the flight ahead, at a point chosen near the lamp.
+    fn scattered_near_lamp(&mut self, leg: &Leg) -> Option<Rgb> {
+        let scene = self.c.scene;
+        let (uc, u) = (self.sampler.next_1d(), self.sampler.next_1d());
+        let choice = self.c.selector.sample(uc)?;
+        let light = &scene.lights[choice.index];
+        let near = Equiangular::new(leg.ray.o, leg.ray.d, light.position()?)?;
+        let t = near.sample(u);
+        let p = Anchor::free(leg.ray.at(t));
+        let li = light.sample_li(&scene.light_context(), p.p, choice.u, Vec2::ZERO)?;
+
+        // To the point, and on to the lamp.
+        let rays = &mut self.counters.rays;
+        let to = scene.transmission(&leg.arrival.from, &Target::Point(p), leg.around, rays)?;
+        let (_, medium) = scene.medium_in(&to.around).filter(|(_, m)| m.scatters())?;
+        let on = scene.transmission(&p, &(&li).into(), to.around, rays)?;
+
+        let phase = medium.phase.pdf(-leg.ray.d, li.wi);
+        let pdf = near.pdf(t);
+        let weight = power_heuristic(pdf, medium.scatter_density(to.tau));
+        let arriving = medium.sigma_s() * to.transmittance * li.radiance * on.transmittance;
+        Some(arriving * (phase * weight / (pdf * li.pdf * choice.pmf)))
+    }
+}
+
+/// Weight of a point at which a flight was scattered by itself, against its choice near `lamp`.
+fn not_near_lamp(here: &Here, leg: &Leg, lamp: Vec3) -> f32 {
+    match (&here.scattering, Equiangular::new(leg.ray.o, leg.ray.d, lamp)) {
+        (Scattering::Medium(point), Some(near)) => {
+            let t = (here.anchor.p - leg.ray.o).length();
+            power_heuristic(point.medium.scatter_density(leg.tau), near.pdf(t))
+        }
+        _ => 1.0,
     }
 }
 

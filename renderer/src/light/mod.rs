@@ -187,6 +187,16 @@ lights! {
 }
 
 impl Light {
+    /// Where it is, if it has no extent but a place.
+    #[inline]
+    pub fn position(&self) -> Option<Vec3> {
+        match self {
+            Self::Point(light) => Some(light.position()),
+            Self::Spot(light) => Some(light.position()),
+            _ => None,
+        }
+    }
+
     /// The emission of an object; `None` when it has no area or emits nothing (a constant black).
     pub fn area(geometry: &Geometry, object: ObjectId, emission: &Emission) -> Option<Self> {
         AreaLight::new(geometry, object, emission).map(Self::Area)

@@ -10,8 +10,10 @@
 //!
 //! Of phase functions, see [`Phase`].
 
+mod equiangular;
 mod phase;
 
+pub use equiangular::Equiangular;
 pub use phase::{Example, Phase, roster};
 
 use crate::math::{ONE_MINUS_EPSILON, exp, ln_1p};

@@ -8,8 +8,8 @@ use super::vertex::{Subpath, Vertex, abs_cos, distance_density};
 use super::walk::Tracer;
 use crate::bsdf::Transport;
 use crate::math::{Anchor, Ray, Vec2, Vec3};
-use crate::medium::Medium;
-use crate::scene::Target;
+use crate::medium::{Medium, transmittance};
+use crate::scene::{Enclosures, Target};
 use crate::spectrum::Rgb;
 
 /// A path made by one strategy.
@@ -39,42 +39,103 @@ fn per_area(at: &Anchor, w: Vec3, d2: f64) -> f64 {
     abs_cos(at, w) / d2
 }
 
+/// Decides by chance whether a connection is worth the rays that it takes.
+pub trait Chance {
+    /// The probability with which a connection was kept that contributes about `estimate`, in its largest channel; `None` drops it.
+    fn keep(&mut self, estimate: impl FnOnce() -> f32) -> Option<f32>;
+}
+
+/// Keeps all connections.
+#[derive(Clone, Copy, Debug)]
+pub struct Always;
+
+impl Chance for Always {
+    #[inline]
+    fn keep(&mut self, _: impl FnOnce() -> f32) -> Option<f32> {
+        Some(1.0)
+    }
+}
+
+/// A connection's contribution is not estimated at less than this share of what it were alone and without media: an estimate that is
+/// too low would make it rare and large.
+const LEAST_SHARE: f32 = 1e-3;
+
 /// The straight way between the two ends of a connection.
 struct Way {
     /// The ray that must be free, unless that is known already.
     shadow: Option<Ray>,
-    /// What media let through.
+    /// What media let through, over the probability with which the way was followed.
     transmittance: Rgb,
-    /// Optical depth of the media that scatter.
-    tau: Rgb,
+    /// Optical depth of the media that scatter; `None` in a scene without media.
+    tau: Option<Rgb>,
+}
+
+impl Way {
+    /// Density of the distance of a flight along it ([`distance_density`]).
+    #[inline]
+    fn density(&self, end: Option<&Medium>) -> f64 {
+        self.tau.map_or(1.0, |tau| distance_density(tau, end))
+    }
+
+    /// The path that connects its ends by it.
+    #[inline(always)]
+    fn connection(self, value: Rgb, weight: impl Fn(&Self) -> f64, raster: Option<Vec2>) -> Connection {
+        Connection { value: value * self.transmittance, weight: weight(&self), shadow: self.shadow, raster }
+    }
 }
 
 impl Tracer<'_> {
     /// The way from a vertex to `target`, in direction `w`; `None` when it is known to be blocked. How much media let through takes part
-    /// in the weights, so where there are any the way is followed at once.
+    /// in the weights, so where there are any the way is followed at once, unless `chance` decides otherwise: the connection would
+    /// contribute `value` times its weight if nothing were in the way.
     #[inline(always)]
-    fn way(&mut self, from: &Vertex, w: Vec3, target: Target) -> Option<Way> {
+    fn way(
+        &mut self,
+        from: &Vertex,
+        w: Vec3,
+        target: Target,
+        value: Rgb,
+        weight: impl Fn(&Way) -> f64,
+        chance: &mut impl Chance,
+    ) -> Option<Way> {
         if !self.scene.features.has_media() {
             let shadow = match &target {
                 Target::Point(end) => from.anchor.segment_to(end),
                 Target::Direction(d) => from.anchor.ray(*d),
             };
-            return Some(Way { shadow: Some(shadow), transmittance: Rgb::ONE, tau: Rgb::ZERO });
+            return Some(Way { shadow: Some(shadow), transmittance: Rgb::ONE, tau: None });
         }
-        self.way_through_media(from, w, &target)
+        let around = from.around_towards(self.scene, w);
+        let q = chance.keep(|| {
+            let guess = self.guess(from, &target, &around);
+            let estimate = (value * guess.transmittance).max_component() * weight(&guess) as f32;
+            estimate.max(LEAST_SHARE * value.max_component())
+        })?;
+        self.way_through_media(from, &target, around, q)
     }
 
-    /// The same where there are media. Apart, so that it costs nothing where there are none.
+    /// The way if there were nothing on it but what it starts in. Light from infinitely far is taken to be free of media.
     #[inline(never)]
-    fn way_through_media(&mut self, from: &Vertex, w: Vec3, target: &Target) -> Option<Way> {
-        let around = from.around_towards(self.scene, w);
+    fn guess(&self, from: &Vertex, target: &Target, around: &Enclosures) -> Way {
+        let mut way = Way { shadow: None, transmittance: Rgb::ONE, tau: Some(Rgb::ZERO) };
+        if let (Some((_, medium)), Target::Point(end)) = (self.scene.medium_in(around), target) {
+            let tau = medium.tau((end.p - from.anchor.p).length());
+            way.transmittance = transmittance(tau);
+            way.tau = Some(if medium.scatters() { tau } else { Rgb::ZERO });
+        }
+        way
+    }
+
+    /// The way where there are media, followed with probability `q`. Apart, so that it costs nothing where there are none.
+    #[inline(never)]
+    fn way_through_media(&mut self, from: &Vertex, target: &Target, around: Enclosures, q: f32) -> Option<Way> {
         let through = self.scene.transmission(&from.anchor, target, around, &mut self.counters.rays)?;
-        Some(Way { shadow: None, transmittance: through.transmittance, tau: through.tau })
+        Some(Way { shadow: None, transmittance: through.transmittance / q, tau: Some(through.tau) })
     }
 
     /// What comes through from a vertex to `target` in direction `w`; `None` when nothing does.
     pub fn arriving(&mut self, from: &Vertex, w: Vec3, target: Target) -> Option<Rgb> {
-        let way = self.way(from, w, target)?;
+        let way = self.way(from, w, target, Rgb::ONE, |_| 1.0, &mut Always)?;
         self.is_clear(way.shadow.as_ref()).then_some(way.transmittance)
     }
 
@@ -90,12 +151,6 @@ impl Tracer<'_> {
         let Some(ray) = shadow else { return true };
         self.counters.rays += 1;
         !self.scene.accel.occluded(ray)
-    }
-
-    /// Density of the distance of a flight through media ([`distance_density`]).
-    #[inline]
-    fn distance(&self, tau: Rgb, end: Option<&Medium>) -> f64 {
-        if self.scene.features.has_media() { distance_density(tau, end) } else { 1.0 }
     }
 
     /// Strategy (0, t): vertex t - 1 of the camera walk lies on a light.
@@ -139,7 +194,9 @@ impl Tracer<'_> {
             let (pdf_pos, _) = light.pdf_le(&self.scene.light_context(), -e.w, -e.w);
             let before = f64::from(pdf_pos) * abs_cos(&last.anchor, e.w);
             // Through the media on the way out, and back.
-            let (out, back) = (self.distance(e.tau, None), self.distance(e.tau, last.medium()));
+            let way =
+                Way { shadow: None, transmittance: Rgb::ONE, tau: self.scene.features.has_media().then_some(e.tau) };
+            let (out, back) = (way.density(None), way.density(last.medium()));
             let weight = self.hit_weight(camera, t, pdf_rev, e.pdf * out, 1.0, before * back);
             Some(Connection { value, weight, shadow: None, raster: None })
         })
@@ -164,7 +221,14 @@ impl Tracer<'_> {
     }
 
     /// Strategy (1, t), t > 1: a light sampled from vertex t - 1 of the camera walk.
-    pub fn next_event(&mut self, camera: &Subpath, t: usize, uc: f32, u: Vec2) -> Option<Connection> {
+    pub fn next_event(
+        &mut self,
+        camera: &Subpath,
+        t: usize,
+        uc: f32,
+        u: Vec2,
+        chance: &mut impl Chance,
+    ) -> Option<Connection> {
         let at = &camera.vertices[t - 1];
         let scattering = at.connectible()?;
         let choice = self.selector.sample(uc)?;
@@ -177,8 +241,6 @@ impl Tracer<'_> {
         if value.is_black() {
             return None;
         }
-        let way = self.way(at, li.wi, (&li).into())?;
-        let value = value * way.transmittance;
 
         // Densities of a walk that starts at this point of the light.
         let flags = light.flags();
@@ -191,16 +253,18 @@ impl Tracer<'_> {
             let direct = if li.delta { 1.0 } else { f64::from(li.pdf) * per_area(&li.light, li.wi, d2) / pdf_pos };
             (pdf_emit * per_area(&at.anchor, li.wi, d2), direct)
         };
-        let onwards = onwards * self.distance(way.tau, at.medium());
         let back = at.pdf_back(scattering, li.wi, Transport::Radiance);
         let h = self.heuristic;
-        let camera_sum = camera.beyond(h, t - 1, onwards, back);
-        // The camera walk that hits the light: its density over that of sampling the light, in the same measure.
-        let reach = if li.delta { 0.0 } else { direct };
-        let ratio = f64::from(pdf_dir) * self.distance(way.tau, None) / f64::from(pdf);
-        let light_sum = h.fold(0.0, Step { ratio, reach });
-        let weight = h.weight(light_sum, camera_sum, direct);
-        Some(Connection { value, weight, shadow: way.shadow, raster: None })
+        let weight = |way: &Way| {
+            let camera_sum = camera.beyond(h, t - 1, onwards * way.density(at.medium()), back);
+            // The camera walk that hits the light: its density over that of sampling the light, in the same measure.
+            let reach = if li.delta { 0.0 } else { direct };
+            let ratio = f64::from(pdf_dir) * way.density(None) / f64::from(pdf);
+            let light_sum = h.fold(0.0, Step { ratio, reach });
+            h.weight(light_sum, camera_sum, direct)
+        };
+        let way = self.way(at, li.wi, (&li).into(), value, weight, chance)?;
+        Some(way.connection(value, weight, None))
     }
 
     /// Strategy (s, 1), s > 1: vertex s - 1 of the light walk seen from the lens. The contribution is that of the whole picture, to be
@@ -215,18 +279,25 @@ impl Tracer<'_> {
         if value.is_black() {
             return None;
         }
-        let way = self.way(at, we.wi, Target::Point(we.lens))?;
-        let value = value * way.transmittance;
         let (_, pdf_dir) = self.camera.pdf_we(-we.wi);
         let d2 = f64::from(we.dist) * f64::from(we.dist);
-        let onwards = f64::from(pdf_dir) * per_area(&at.anchor, we.wi, d2) * self.distance(way.tau, at.medium());
+        let onwards = f64::from(pdf_dir) * per_area(&at.anchor, we.wi, d2);
         let back = at.pdf_back(scattering, we.wi, Transport::Importance);
-        let weight = self.heuristic.weight(light.beyond(self.heuristic, s - 1, onwards, back), 0.0, 1.0);
-        Some(Connection { value, weight, shadow: way.shadow, raster: Some(we.raster) })
+        let h = self.heuristic;
+        let weight = |way: &Way| h.weight(light.beyond(h, s - 1, onwards * way.density(at.medium()), back), 0.0, 1.0);
+        let way = self.way(at, we.wi, Target::Point(we.lens), value, weight, &mut Always)?;
+        Some(way.connection(value, weight, Some(we.raster)))
     }
 
     /// Strategy (s, t), s > 1, t > 1: the two ends joined.
-    pub fn join(&mut self, light: &Subpath, s: usize, camera: &Subpath, t: usize) -> Option<Connection> {
+    pub fn join(
+        &mut self,
+        light: &Subpath,
+        s: usize,
+        camera: &Subpath,
+        t: usize,
+        chance: &mut impl Chance,
+    ) -> Option<Connection> {
         let (x, z) = (&light.vertices[s - 1], &camera.vertices[t - 1]);
         let (at_x, at_z) = (x.connectible()?, z.connectible()?);
         let d = x.anchor.p - z.anchor.p;
@@ -245,15 +316,18 @@ impl Tracer<'_> {
         if value.is_black() {
             return None;
         }
-        let way = self.way(z, w, Target::Point(x.anchor))?;
-        let value = value * way.transmittance;
         let d2 = f64::from(d2);
-        let to_x = f64::from(pdf_z) * per_area(&x.anchor, w, d2) * self.distance(way.tau, x.medium());
-        let to_z = f64::from(pdf_x) * per_area(&z.anchor, w, d2) * self.distance(way.tau, z.medium());
+        let to_x = f64::from(pdf_z) * per_area(&x.anchor, w, d2);
+        let to_z = f64::from(pdf_x) * per_area(&z.anchor, w, d2);
         let back_x = x.pdf_back(at_x, -w, Transport::Importance);
         let back_z = z.pdf_back(at_z, w, Transport::Radiance);
         let h = self.heuristic;
-        let weight = h.weight(light.beyond(h, s - 1, to_x, back_x), camera.beyond(h, t - 1, to_z, back_z), 1.0);
-        Some(Connection { value, weight, shadow: way.shadow, raster: None })
+        let weight = |way: &Way| {
+            let light_sum = light.beyond(h, s - 1, to_x * way.density(x.medium()), back_x);
+            let camera_sum = camera.beyond(h, t - 1, to_z * way.density(z.medium()), back_z);
+            h.weight(light_sum, camera_sum, 1.0)
+        };
+        let way = self.way(z, w, Target::Point(x.anchor), value, weight, chance)?;
+        Some(way.connection(value, weight, None))
     }
 }

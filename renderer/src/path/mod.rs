@@ -8,7 +8,7 @@ mod scattering;
 mod vertex;
 mod walk;
 
-pub use connect::Connection;
+pub use connect::{Always, Chance, Connection};
 pub use counters::Counters;
 pub use scattering::{MediumPoint, Scattering};
 pub use vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};

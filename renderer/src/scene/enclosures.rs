@@ -188,9 +188,10 @@ impl Scene {
 
     /// What encloses a light, if it is the same all over it.
     fn around_light(&self, light: &Light) -> Option<Enclosures> {
+        if let Some(p) = light.position() {
+            return Some(self.enclosures_at(p));
+        }
         match light {
-            Light::Point(l) => Some(self.enclosures_at(l.position())),
-            Light::Spot(l) => Some(self.enclosures_at(l.position())),
             Light::Area(l) => {
                 let count = self.geometry.primitive_count(l.object());
                 let at = |k: u32| {

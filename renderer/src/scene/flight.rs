@@ -71,6 +71,8 @@ pub struct Transmission {
     pub transmittance: Rgb,
     /// Optical depth of the scattering media alone, as in [`Flight::tau`].
     pub tau: Rgb,
+    /// What encloses the far end; at a surface, on the side from which it was reached.
+    pub around: Enclosures,
 }
 
 /// Optical depths that have added up on the way.
@@ -193,7 +195,7 @@ impl Scene {
                 return None;
             }
             let Some(surface) = surface else {
-                return Some(Transmission { transmittance: transmittance(tau), tau: depth.scattering });
+                return Some(Transmission { transmittance: transmittance(tau), tau: depth.scattering, around });
             };
             around = self.passes(surface.object, surface.ng.dot(ray.d) < 0.0, &around)?;
             from = surface.anchor();

@@ -89,6 +89,7 @@ impl Scene {
         if diagnostics.has_errors() {
             return None;
         }
+        check_insides(&meshes, &shapes, file, diagnostics);
 
         // Place the shapes.
         let mut builder = shapes::ObjectBuilder::new(meshes);
@@ -241,6 +242,21 @@ fn check_media(
         if shape.emission.is_some() && matches!(materials.get(shape.material.0 as usize), Some(Material::Null)) {
             let help = "give it another material, or let a shape just inside or outside of it emit";
             diagnostics.error(file, shape.name.clone(), "a surface that is not there (null) can't emit", help);
+        }
+    }
+}
+
+/// Warns of meshes with an inside that they do not enclose, once for each.
+fn check_insides(meshes: &[crate::geometry::Mesh], shapes: &[ShapeDesc], file: &str, diagnostics: &mut Diagnostics) {
+    let mut known = std::collections::BTreeSet::new();
+    for shape in shapes.iter().filter(|s| s.interior.is_some()) {
+        if let desc::ShapeKind::Mesh(id) = shape.kind
+            && known.insert(id.0)
+            && !meshes[id.0 as usize].is_closed()
+        {
+            let message = "the mesh has an interior but is not closed: an edge of it belongs to one triangle only";
+            let help = "close it; light that passes through the hole is taken to be inside or outside as it was before";
+            diagnostics.warn(file, shape.name.clone(), message, help);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
+mod chance;
 #[path = "../common/mod.rs"]
 mod common;
 mod oracle;

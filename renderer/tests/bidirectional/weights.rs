@@ -3,7 +3,7 @@ use crate::scenes::{self, Fog};
 use renderer::camera::Camera;
 use renderer::math::Vec2;
 use renderer::path::mis::Heuristic;
-use renderer::path::{Connection, Counters, Subpath, Tracer, Vertex};
+use renderer::path::{Always, Connection, Counters, Subpath, Tracer, Vertex};
 use renderer::sampling::{IndependentSampler, Sampler};
 use renderer::scene::Scene;
 
@@ -57,10 +57,10 @@ fn compare(sample: &mut Sample<'_>, view: &Camera, fog: &Fog, numbers: &mut Inde
                 (0, _) => sample.tracer.hit(&sample.camera, t),
                 (1, _) => {
                     sampled = light_point(scene, &sample.camera, t, uc, u);
-                    sample.tracer.next_event(&sample.camera, t, uc, u)
+                    sample.tracer.next_event(&sample.camera, t, uc, u, &mut Always)
                 }
                 (_, 1) => sample.tracer.to_lens(&sample.light, s, Vec2::ZERO),
-                _ => sample.tracer.join(&sample.light, s, &sample.camera, t),
+                _ => sample.tracer.join(&sample.light, s, &sample.camera, t, &mut Always),
             };
             let Some(path) = path else { continue };
             if s + t > EDGES + 1 || !sample.tracer.is_free(&path) {

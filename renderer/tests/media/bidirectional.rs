@@ -4,7 +4,7 @@ use crate::common::{assert_same_mean, build, camera, emission, render};
 use crate::scenes::{GLASS, NULL, WHITE, ball, body, desc, grey};
 use renderer::bsdf::Material;
 use renderer::integrator::IntegratorKind::{self, Bdpt, Light, Mmlt, Path};
-use renderer::light::LightDesc;
+use renderer::light::{LightDesc, SpotFalloff};
 use renderer::math::DVec3;
 use renderer::medium::Medium;
 use renderer::scene::Scene;
@@ -45,22 +45,43 @@ fn furnaces_have_the_same_terms_in_all_integrators() {
     }
 }
 
+/// What lights the cloud.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Lamp,
+    Point,
+    Spot,
+    Sun,
+}
+
 /// A white floor in a coloured cloud, with a lamp in it or in the sun.
-fn cloud(sun: bool, g: f32) -> Scene {
+fn cloud(source: Source, g: f32) -> Scene {
     let medium = Medium::new(Rgb::new(0.3, 0.6, 1.2), Rgb::new(0.95, 0.8, 0.6), grey(1.0, 1.0, g).phase).unwrap();
     let mut shapes = vec![
         ball(DVec3::ZERO, 2.0, NULL, Some(0)),
         body(ShapeKind::Cube, DVec3::Y * -1.4, DVec3::new(3.0, 0.4, 3.0), WHITE, None),
     ];
     let mut lights = Vec::new();
-    if sun {
-        let direction = DVec3::new(0.4, -1.0, -0.3);
-        lights.push(LightDesc::Directional { direction, irradiance: Rgb::splat(1.5) });
-    } else {
-        // No point: beside one, distances that are sampled without regard to it have no finite variance.
-        let mut lamp = ball(DVec3::new(0.4, 0.6, 0.2), 0.25, WHITE, None);
-        lamp.emission = emission(8.0);
-        shapes.push(lamp);
+    let position = DVec3::new(0.4, 0.6, 0.2);
+    match source {
+        Source::Lamp => {
+            let mut lamp = ball(position, 0.25, WHITE, None);
+            lamp.emission = emission(8.0);
+            shapes.push(lamp);
+        }
+        Source::Point => lights.push(LightDesc::Point { position, intensity: Rgb::splat(2.0) }),
+        Source::Spot => lights.push(LightDesc::Spot {
+            position,
+            direction: DVec3::new(-0.6, -0.8, 0.1),
+            intensity: Rgb::splat(9.0),
+            beam: 20.0,
+            cutoff: 30.0,
+            falloff: SpotFalloff::LinearAngle,
+        }),
+        Source::Sun => {
+            let direction = DVec3::new(0.4, -1.0, -0.3);
+            lights.push(LightDesc::Directional { direction, irradiance: Rgb::splat(1.5) });
+        }
     }
     let mut d = desc(shapes, vec![medium], lights);
     d.camera = camera(DVec3::new(0.0, 1.0, 5.0), DVec3::Y * -0.3, 30.0);
@@ -69,11 +90,20 @@ fn cloud(sun: bool, g: f32) -> Scene {
 
 #[test]
 fn single_and_multiple_scattering_agree_from_both_ends() {
-    for (sun, g, depth) in [(false, 0.0, 2), (false, 0.7, 7), (false, -0.4, 3), (true, 0.0, 7), (true, -0.4, 2)] {
-        let scene = cloud(sun, g);
+    use Source::{Lamp, Point, Spot, Sun};
+    for (source, g, depth) in [
+        (Lamp, 0.0, 2),
+        (Lamp, 0.7, 7),
+        (Lamp, -0.4, 3),
+        (Point, 0.0, 2),
+        (Point, -0.4, 3),
+        (Spot, -0.4, 4),
+        (Sun, 0.0, 7),
+        (Sun, -0.4, 2),
+    ] {
+        let scene = cloud(source, g);
         for (kind, spp, share) in [(Light, 1024, 0.1), (Bdpt, 512, 0.1), (Mmlt, 512, 0.15)] {
-            let light = if sun { "sun" } else { "lamp" };
-            assert_agrees(&scene, kind, spp, depth, share, &format!("{light}, g {g}, {depth} edges"));
+            assert_agrees(&scene, kind, spp, depth, share, &format!("{source:?}, g {g}, {depth} edges"));
         }
     }
 }

@@ -2,7 +2,7 @@ use super::constants::{ChainConstants, MmltOptions};
 use crate::film::{Counters, SplatSums};
 use crate::integrator::UnitContext;
 use crate::math::Vec2;
-use crate::path::{Connection, Subpath, Tracer};
+use crate::path::{Always, Connection, Subpath, Tracer};
 use crate::sampling::{Discrete, IndependentSampler, PrimarySpace, Sampler, StepSizes, Stream, hash_words};
 use crate::spectrum::Rgb;
 use std::ops::Range;
@@ -148,11 +148,12 @@ impl<'a, 'b> Pool<'a, 'b> {
         }
         for t in 2..=from_camera.min(longest) {
             if self.length(t).is_some() {
-                let path = self.tracer.next_event(&self.camera, t, uc, u);
+                let path = self.tracer.next_event(&self.camera, t, uc, u, &mut Always);
                 self.join((1, t), path, raster);
             }
             for s in (2..=from_light.min(longest + 1 - t)).filter(|s| s + t > 3) {
-                let path = self.length(s + t - 1).and_then(|_| self.tracer.join(&self.light, s, &self.camera, t));
+                let path =
+                    self.length(s + t - 1).and_then(|_| self.tracer.join(&self.light, s, &self.camera, t, &mut Always));
                 self.join((s, t), path, raster);
             }
         }

@@ -4,7 +4,6 @@ use super::evaluate::{Evaluator, Proposal};
 use crate::film::{Counters, SplatSums};
 use crate::integrator::UnitContext;
 use crate::sampling::{IndependentSampler, PrimarySpace, Sampler, hash_words};
-use crate::spectrum::Rgb;
 use serde::{Deserialize, Serialize};
 
 /// Names the mutations of chains among all hashes.
@@ -179,6 +178,7 @@ fn splat(c: &UnitContext<'_>, splats: &mut SplatSums, path: &Proposal, weight: f
     if weight == 0.0 {
         return;
     }
-    let value: Rgb = path.value * weight as f32;
+    // In f64: one over a target near the end of f32's range is beyond it, their product is not.
+    let value = path.value.map(|v| (f64::from(v) * weight) as f32);
     splats.splat(&c.view.filter, path.raster, value);
 }

@@ -1,7 +1,7 @@
 use super::constants::{ChainConstants, MmltOptions};
 use crate::integrator::UnitContext;
 use crate::math::Vec2;
-use crate::path::{Connection, Subpath, Tracer};
+use crate::path::{Always, Connection, Subpath, Tracer};
 use crate::sampling::{Discrete, PrimarySpace, Sampler, StepSizes, Stream};
 use crate::spectrum::Rgb;
 
@@ -98,11 +98,11 @@ impl<'a> Evaluator<'a> {
             1 => {
                 let mut numbers = space.stream(Stream::Connection, &self.sizes);
                 let (uc, u) = (numbers.next_1d(), numbers.next_2d());
-                self.tracer.next_event(&self.camera, t, uc, u).and_then(|path| self.visible(&path))
+                self.tracer.next_event(&self.camera, t, uc, u, &mut Always).and_then(|path| self.visible(&path))
             }
             _ => {
                 self.walk_light(space, s)?;
-                self.tracer.join(&self.light, s, &self.camera, t).and_then(|path| self.visible(&path))
+                self.tracer.join(&self.light, s, &self.camera, t, &mut Always).and_then(|path| self.visible(&path))
             }
         };
         value.map(|value| (value * pixels, raster))

@@ -76,3 +76,24 @@ fn what_makes_no_sense_together_is_refused_when_the_scene_is_built() {
     let lamp = errors("[materials.a]\nkind = 'null'\n[[shapes]]\nkind = 'cube'\nmaterial = 'a'\nemission = 1");
     assert!(lamp.contains("(null) can't emit"), "{lamp}");
 }
+
+#[test]
+fn an_interior_in_an_open_mesh_is_warned_of() {
+    let text = document(
+        "[media.fog]\n[materials.border]\nkind = 'null'
+        [[shapes]]\nkind = 'mesh'\nfile = 'pyramid.obj'\nmaterial = 'border'\ninterior = 'fog'
+        [[shapes]]\nkind = 'mesh'\nfile = 'pyramid.obj'\nmaterial = 'border'\ninterior = 'fog'
+        [[shapes]]\nkind = 'cube'\nmaterial = 'border'\ninterior = 'fog'",
+    );
+    let warnings = |obj: &str| {
+        let (scene, _) = scene(&[("scene.toml", text.as_bytes()), ("pyramid.obj", obj.as_bytes())]);
+        let mut diagnostics = crate::diagnostics::Diagnostics::default();
+        assert!(crate::scene::Scene::build(scene, "scene.toml", &mut diagnostics).is_some());
+        diagnostics.list.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let closed = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    assert_eq!(warnings(closed), [""; 0]);
+    let open = closed.replace("f 2 3 4\n", "");
+    let warned = warnings(&open);
+    assert!(warned.len() == 1 && warned[0].contains("not closed"), "{warned:?}");
+}
