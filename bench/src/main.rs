@@ -2,6 +2,7 @@
 //! whether the errors that they tell are true. See `README.md` beside this crate.
 
 mod agree;
+mod auto;
 mod coverage;
 mod error;
 mod farm;
@@ -33,6 +34,8 @@ enum What {
     Error(error::Args),
     /// Two one-thread workers against one two-thread render.
     Farm(farm::Args),
+    /// Error times cost of path, bdpt and mmlt, and whether `auto` chooses the best of them.
+    Auto(auto::Args),
     /// Whether all integrators render the same pictures; exit status 1 when they don't.
     Agree(agree::Args),
     /// Whether the errors that pictures tell of themselves are true; exit status 1 when they aren't.
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         What::Samples(args) => samples::run(args).map(|r| figures(show(cli.json, &r, |r| samples::table(r)))),
         What::Error(args) => error::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Farm(args) => farm::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
+        What::Auto(args) => auto::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Agree(args) => agree::run(args).map(|r| (show(cli.json, &r, agree::table), r.passed)),
         What::Coverage(args) => coverage::run(args).map(|r| (show(cli.json, &r, ToString::to_string), r.passed())),
     };

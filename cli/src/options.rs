@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Render options")]
 pub struct RenderArgs {
-    /// Light transport algorithm (path, light, bdpt, mmlt)
+    /// Light transport algorithm (path, light, bdpt, mmlt, or auto: trials choose path, bdpt or mmlt)
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<IntegratorKind>,
-    /// Samples (or light paths) per pixel
+    /// Samples (or light paths) per pixel; auto renders for as long as path would take for so many
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 24))]
     pub spp: Option<u32>,
     /// Mutations per pixel (mmlt)

@@ -8,7 +8,7 @@ use renderer::film::exr::{self, Provenance};
 use renderer::film::{Counters, ErrorSummary, MergedImage, png};
 use renderer::integrator::IntegratorKind;
 use renderer::integrator::mmlt::ChainStats;
-use renderer::job::{LocalOutcome, RenderSettings};
+use renderer::job::{Choice, LocalOutcome, RenderSettings};
 use renderer::scene::bundle::Digest;
 use serde::Serialize;
 use std::fmt;
@@ -65,6 +65,8 @@ pub struct Summary {
     interrupted: bool,
     scene: Digest,
     integrator: IntegratorKind,
+    /// What `auto` chose, and why.
+    choice: Option<Choice>,
     width: u32,
     height: u32,
     spp: f64,
@@ -88,6 +90,7 @@ impl Summary {
             interrupted: outcome.interrupted,
             scene,
             integrator: settings.integrator,
+            choice: outcome.choice.clone(),
             width: image.width,
             height: image.height,
             spp: image.counters.samples as f64 / (f64::from(image.width) * f64::from(image.height)),
@@ -111,7 +114,12 @@ impl Summary {
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let c = &self.counters;
-        let samples = self.integrator.sample_name();
+        let samples = self.choice.as_ref().map_or(self.integrator, |c| c.integrator).sample_name();
+        if let Some(c) = &self.choice {
+            let share =
+                c.share.map_or_else(String::new, |s| format!("; trials took {:.1} % of the samples", 100.0 * s));
+            writeln!(f, "auto chose {}: {}{share}", c.integrator.name(), c.why)?;
+        }
         write!(f, "{} x {} pixels, {:.1} {samples} per pixel", self.width, self.height, self.spp)?;
         write!(f, " in {}", duration(self.seconds))?;
         write!(f, ", {}rays/s", quantity(self.rays_per_s))?;

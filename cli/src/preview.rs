@@ -49,8 +49,12 @@ impl Preview {
 
     /// Writes a preview when it is time to. `Err` says, once, why none can be written.
     pub fn update(&mut self, merger: &Merger) -> Result<(), String> {
+        // Nothing of the image is there while integrators are tried.
+        if merger.counters().samples == 0 {
+            return Ok(());
+        }
         let completed = !self.covered && self.covers(merger);
-        let due = completed || (Instant::now() >= self.next && merger.counters().samples > 0);
+        let due = completed || Instant::now() >= self.next;
         if self.broken || !due {
             return Ok(());
         }
@@ -72,7 +76,7 @@ impl Preview {
         if !self.covered {
             let done = merger.next_unit();
             let plan = merger.plan();
-            self.covered = plan.pass > 0
+            self.covered = plan.own_pass() > 0
                 || (plan.sampling == Sampling::Paths && done > 0)
                 || (self.seen..done).any(|unit| plan.covers_film(unit));
             self.seen = done;

@@ -46,6 +46,36 @@ fn threads_and_names_change_no_byte() {
 }
 
 #[test]
+fn auto_says_what_it_chose_and_why() {
+    let lab = Lab::new();
+    let render = |threads: &str, out: &str| {
+        let args = ["render", "scene.xml", "--spp", "100", "--integrator", "auto", "--json", "-o", out, "--threads"];
+        let run = lab.run(&[&args[..], &[threads]].concat());
+        run.status(0);
+        (run.json(), std::fs::read(lab.path(out)).unwrap())
+    };
+    let (done, bytes) = render("1", "auto.exr");
+    let choice = &done["choice"];
+    let integrator = choice["integrator"].as_str().unwrap().to_string();
+    assert!(["path", "bdpt", "mmlt"].contains(&&*integrator), "{choice}");
+    assert!(choice["why"].as_str().unwrap().contains("times as long"), "{choice}");
+    assert_eq!(lab.picture("auto.exr").metadata.unwrap().choice.as_ref(), Some(choice));
+    assert!(choice["share"].as_f64().unwrap() < 1.0 && done["spp"].as_f64().unwrap() >= 1.0, "{done}");
+    assert!(render("2", "auto2.exr").1 == bytes, "the number of threads changes the file");
+    // The image is that of the chosen integrator with as many samples, and nothing of the trials.
+    let count = (done["spp"].as_f64().unwrap() as u32).to_string();
+    if integrator != "mmlt" {
+        let args = ["render", "scene.xml", "--integrator", &integrator, "--spp", &count, "-o", "own.exr"];
+        lab.run(&args).status(0);
+        let same = |name: &str| lab.picture("own.exr").channel(name) == lab.picture("auto.exr").channel(name);
+        assert!(["R", "G", "B", "samples.Y", "stderror.R"].into_iter().all(same));
+    }
+    let small = lab.run(&["render", "scene.xml", "--spp", "2", "--integrator", "auto", "--json", "-o", "small.exr"]);
+    small.status(0);
+    assert_eq!(small.json()["choice"]["integrator"], "path");
+}
+
+#[test]
 fn wrong_command_lines_are_usage_errors() {
     let lab = Lab::new();
     for args in [
@@ -83,6 +113,8 @@ fn options_that_do_not_go_together_are_usage_errors() {
         (&["scene.xml", "--mpp", "3", "--integrator", "bdpt"], "give --spp in place of --mpp"),
         (&["scene.xml", "--spp", "3", "--integrator", "mmlt"], "give --mpp in place of --spp"),
         (&["mmlt.toml", "--spp", "3"], "give --mpp in place of --spp"),
+        (&["scene.xml", "--mpp", "3", "--integrator", "auto"], "give --spp in place of --mpp"),
+        (&["scene.xml", "--mmlt", "plain", "--integrator", "auto"], "give --integrator mmlt"),
         (&["scene.xml", "--mmlt", "plain"], "give --integrator mmlt"),
         (&["mmlt.toml", "--mmlt", "", "--integrator", "path"], "give --integrator mmlt"),
         (&["scene.xml", "--integrator", "mmlt", "--mmlt", "lift=3"], "between 0 and 1"),
@@ -105,11 +137,11 @@ fn scenes_name_the_integrators_that_there_are() {
         lab.write("scene.toml", &format!("camera = {{ from = [0, 0, 5], to = [0, 0, 0] }}\n[render]\nintegrator = '{name}'\n[[lights]]\nkind = 'constant'\n"));
         lab.run(&["info", "scene.toml"])
     };
-    for (name, _) in IntegratorKind::ALL {
+    for name in IntegratorKind::names() {
         info(name).status(0);
     }
-    let stderr = info("auto").status(1);
-    let known: Vec<_> = IntegratorKind::ALL.iter().map(|(name, _)| *name).collect();
+    let stderr = info("autos").status(1);
+    let known: Vec<_> = IntegratorKind::names().collect();
     assert!(stderr.contains("scene.toml, line 3") && stderr.contains(&known.join(", ")), "{stderr}");
 }
 

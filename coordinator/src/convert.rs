@@ -211,6 +211,8 @@ pub fn status(farm: &Farm, job: &Job, now: Duration) -> proto::JobStatus {
         workers: farm.workers().values().filter(working).count() as u32,
         scene: s.scene.to_string(),
         rate: rates.map_or(0.0, |r| r.0),
+        chosen: p.choice.as_ref().map_or_else(String::new, |c| c.0.name().into()),
+        chosen_because: p.choice.as_ref().map_or_else(String::new, |c| c.1.clone()),
     }
 }
 

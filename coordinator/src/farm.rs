@@ -157,8 +157,8 @@ impl Farm {
     /// The merge has come on.
     pub fn note_progress(&mut self, id: JobId, progress: Progress, now: Duration) {
         if let Some(job) = self.jobs.get_mut(&id) {
-            job.progress = progress;
             job.meter.note(now, progress.counters.samples, progress.fraction);
+            job.progress = progress;
         }
     }
 

@@ -133,7 +133,7 @@ impl Hub {
                 state,
                 message: message.to_string(),
                 elapsed: job.clock.elapsed(now),
-                progress: job.progress,
+                progress: job.progress.clone(),
             })
         })
     }

@@ -4,6 +4,7 @@ use crate::ids::{JobId, WorkerId};
 use crate::lease::PassBoard;
 use crate::mismatch::Disagreement;
 use renderer::film::Counters;
+use renderer::integrator::IntegratorKind;
 use renderer::job::{PassPlan, RenderSettings};
 use renderer::scene::bundle::Digest;
 use std::collections::{BTreeMap, VecDeque};
@@ -87,7 +88,7 @@ pub struct JobSpec {
 }
 
 /// How far the merge has come.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Units of the pass that are folded.
     pub folded: u32,
@@ -99,6 +100,8 @@ pub struct Progress {
     pub counters: Counters,
     /// Relative error and its upper bound at the last completed pass.
     pub error: Option<(f64, f64)>,
+    /// What `auto` chose, and why.
+    pub choice: Option<(IntegratorKind, String)>,
 }
 
 /// The pass under way.

@@ -7,7 +7,7 @@ use crate::job::{JobSpec, JobState, Progress};
 use crate::merging::{Merging, Step};
 use crate::store::{Change, StoreError, StoredResult, wait};
 use renderer::film::MergedImage;
-use renderer::job::{UnitResult, document::PassDocument};
+use renderer::job::{Choice, UnitResult, document::PassDocument};
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Weak};
@@ -25,6 +25,8 @@ pub struct Snapshot {
     pub image: MergedImage,
     /// What it was made of.
     pub spec: Arc<JobSpec>,
+    /// What `auto` chose.
+    pub choice: Option<Choice>,
     /// How far it is.
     pub progress: Progress,
 }
@@ -263,7 +265,7 @@ impl Merge {
         m.finishing = true;
         let (snapshot, store, queue) = (m.snapshot(), hub.store.clone(), hub.merge.clone());
         let write = move || {
-            let progress = snapshot.progress;
+            let progress = snapshot.progress.clone();
             let outcome =
                 crate::image::exr_of(&snapshot).map_err(StoreError::Fault).and_then(|exr| store.write_image(id, &exr));
             queue.send(Request::Written(id, progress, outcome));
@@ -285,7 +287,7 @@ impl Merge {
             return;
         }
         let elapsed = hub.with(|farm, now| {
-            farm.note_progress(id, progress, now);
+            farm.note_progress(id, progress.clone(), now);
             farm.job(id).map(|j| j.clock.elapsed(now)).unwrap_or_default()
         });
         let done = Change::State { job: id, state: JobState::Done, message: String::new(), elapsed, progress };

@@ -168,10 +168,9 @@ impl Merging {
         };
         let bytes = segment.read(at)?;
         self.segment = Some((at.segment, segment));
-        let s = &self.spec.settings;
+        let (w, h) = (self.plan().width, self.plan().height);
         let unit = self.plan().unit(at.unit).ok_or_else(|| StoreError::Fault("no such unit".into()))?;
-        UnitResult::decode(&bytes, &unit, s.width, s.height, self.spec.lights as usize)
-            .map_err(|e| StoreError::Fault(e.to_string()))
+        UnitResult::decode(&bytes, &unit, w, h, self.spec.lights as usize).map_err(|e| StoreError::Fault(e.to_string()))
     }
 
     /// Saves the merge when so much was folded that its results are worth freeing: `bound` bytes, and twice what a save takes.
@@ -205,6 +204,7 @@ impl Merging {
             done_spp: self.merger.done_spp(),
             counters: self.merger.counters(),
             error: self.error,
+            choice: self.merger.choice().map(|c| (c.integrator, c.why.clone())),
         }
     }
 
@@ -213,6 +213,6 @@ impl Merging {
         let image = self.merger.image();
         let mut progress = self.progress();
         progress.error = image.error.map(|e| (e.relative, e.upper95));
-        Snapshot { image, spec: self.spec.clone(), progress }
+        Snapshot { image, spec: self.spec.clone(), choice: self.merger.choice().cloned(), progress }
     }
 }

@@ -27,6 +27,7 @@ pub fn job(s: &JobStatus) -> Value {
         "relative_error": s.error, "relative_error_upper95": s.error_upper,
         "seconds": s.seconds, "seconds_left": s.seconds_left, "samples_per_s": s.rate,
         "submitted_unix_ms": s.submitted_unix_ms, "workers": s.workers, "message": s.message,
+        "chosen": s.chosen, "chosen_because": s.chosen_because,
     })
 }
 

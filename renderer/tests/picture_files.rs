@@ -49,6 +49,7 @@ fn image(count: u32) -> MergedImage {
 
 fn provenance() -> Provenance {
     Provenance {
+        choice: None,
         scene: Digest::of(b"scene"),
         seed: u64::MAX,
         settings: serde_json::json!({"spp": 8, "filter": "tent"}),

@@ -183,6 +183,12 @@ fn tiles_with_splats_are_the_same_through_every_history() {
     all("bdpt");
 }
 
+/// Trials, and the render that they chose.
+#[test]
+fn trials_choose_the_same_through_every_history() {
+    all("auto");
+}
+
 /// Pilot, pools and chains: passes that depend on what those before them found.
 #[test]
 fn chains_are_the_same_through_every_history() {

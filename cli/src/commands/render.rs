@@ -59,7 +59,7 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         console.note("nothing was finished: no picture is written");
         return Err(Failure::Interrupted);
     }
-    let saved = pictures.save(&outcome.image, &settings.provenance(manifest.digest()))?;
+    let saved = pictures.save(&outcome.image, &settings.provenance(manifest.digest(), outcome.choice.as_ref()))?;
     let summary = Summary::new(&outcome, &settings, manifest.digest(), seconds, &saved);
     let summary = summary.with_first_preview(preview.first());
     console.result(&summary, &summary);
@@ -131,7 +131,7 @@ impl Session<'_> {
         let count = if counted { merger.fraction() } else { 0.0 };
         let fraction = if merger.finished() { 1.0 } else { count.max(time).min(1.0) };
         let samples = merger.counters().samples;
-        let samples_name = self.settings.integrator.sample_name();
+        let samples_name = merger.integrator().sample_name();
         self.progress.show(&Moment { fraction, samples, samples_name, pixels, error: preview.error() });
     }
 }

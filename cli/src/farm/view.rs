@@ -68,6 +68,9 @@ pub fn detail(d: &JobDetail) -> String {
     let Some(s) = &d.status else { return String::new() };
     let mut lines = vec![format!("{}  {}", s.id, s.name), format!("state       {}", state_line(s))];
     lines.push(format!("image       {} x {}, {}", s.width, s.height, s.integrator));
+    if !s.chosen.is_empty() {
+        lines.push(format!("chosen      {}: {}", s.chosen, s.chosen_because));
+    }
     lines.push(format!("sampling    {} per pixel, {} rays", samples(s), quantity(s.rays as f64).trim()));
     if s.units > 0 {
         lines.push(format!(
@@ -115,7 +118,8 @@ pub fn state_line(s: &JobStatus) -> String {
 /// How many samples each pixel has, and of which kind.
 pub fn samples(s: &JobStatus) -> String {
     let per_pixel = s.samples as f64 / (f64::from(s.width) * f64::from(s.height)).max(1.0);
-    format!("{per_pixel:.1} {}", s.integrator.parse().map_or("samples", IntegratorKind::sample_name))
+    let integrator = if s.chosen.is_empty() { &s.integrator } else { &s.chosen };
+    format!("{per_pixel:.1} {}", integrator.parse().map_or("samples", IntegratorKind::sample_name))
 }
 
 fn ago(unix_ms: u64) -> String {

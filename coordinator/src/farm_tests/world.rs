@@ -54,7 +54,7 @@ pub fn plans(settings: &RenderSettings) -> Vec<Arc<PassPlan>> {
     let planner = Planner::new(settings.clone());
     let first = planner.first();
     let later = match settings.integrator {
-        IntegratorKind::Path | IntegratorKind::Light => Vec::new(),
+        IntegratorKind::Path | IntegratorKind::Light | IntegratorKind::Auto | IntegratorKind::Moments => Vec::new(),
         IntegratorKind::Bdpt => planner.next(1, first.spp() as u32, Learned::default()).into_iter().collect(),
         IntegratorKind::Mmlt => {
             let groups = 0..settings.replicates;

@@ -152,7 +152,7 @@ async fn check(bytes: Bytes, head: &Head, e: Expected) -> Result<Result<Box<Unit
             return Err("the bytes that came are not those that were announced".to_string());
         }
         let unit = e.plan.unit(unit).ok_or("there is no such unit")?;
-        let (w, h) = (e.settings.width, e.settings.height);
+        let (w, h) = (e.plan.width, e.plan.height);
         UnitResult::decode(&bytes, &unit, w, h, e.lights as usize).map(Box::new).map_err(|e| e.to_string())
     };
     tokio::task::spawn_blocking(work).await.map_err(|e| Status::internal(format!("checking a result failed: {e}")))

@@ -36,7 +36,8 @@ fn job(page: &mut String, s: &JobStatus, query: &str) {
     let shown = s.samples > 0 && !matches!(s.state(), JobState::Failed | JobState::Cancelled);
     let image = if shown { format!("<img src=\"/jobs/{id}/preview.png{link}\" alt=\"\">") } else { String::new() };
     let per_pixel = s.samples as f64 / (f64::from(s.width) * f64::from(s.height)).max(1.0);
-    let samples = s.integrator.parse().map_or("samples", IntegratorKind::sample_name);
+    let samples = rendered_by(s).parse().map_or("samples", IntegratorKind::sample_name);
+    let integrator = if s.chosen.is_empty() { s.integrator.clone() } else { format!("{}: {}", s.integrator, s.chosen) };
     let error = s.error.map_or_else(String::new, |e| format!("{e:.4}"));
     let left = s.seconds_left.map_or_else(String::new, |t| format!("<br><small>{t:.0} s left</small>"));
     let message = match s.message.as_str() {
@@ -51,13 +52,18 @@ fn job(page: &mut String, s: &JobStatus, query: &str) {
          <td class=n>{}<td class=n>{:.0} s",
         s.width,
         s.height,
-        escape(&s.integrator),
+        escape(&integrator),
         s.priority,
         s.fraction,
         100.0 * s.fraction,
         s.workers,
         s.seconds
     );
+}
+
+/// The integrator that renders.
+fn rendered_by(s: &JobStatus) -> &str {
+    if s.chosen.is_empty() { &s.integrator } else { &s.chosen }
 }
 
 fn worker(page: &mut String, w: &WorkerStatus) {

@@ -196,6 +196,7 @@ pub fn progress_to_json(p: &Progress) -> String {
     serde_json::json!({
         "fraction": p.fraction, "spp": p.done_spp, "samples": c.samples, "rays": c.rays,
         "non_finite": c.non_finite, "negative": c.negative, "error": p.error,
+        "choice": p.choice.as_ref().map(|c| (c.0.name(), &c.1)),
     })
     .to_string()
 }
@@ -215,5 +216,6 @@ fn progress_from_json(text: &str) -> Progress {
             negative: count("negative"),
         },
         error: v["error"][0].as_f64().zip(v["error"][1].as_f64()),
+        choice: v["choice"][0].as_str().and_then(|n| n.parse().ok()).zip(v["choice"][1].as_str().map(String::from)),
     }
 }

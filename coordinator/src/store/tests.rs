@@ -68,7 +68,11 @@ fn what_is_confirmed_is_there_after_a_restart() {
         state: JobState::Paused,
         message: "why".into(),
         elapsed: Duration::from_millis(4321),
-        progress: Progress { error: Some((0.5, 0.75)), ..Progress::default() },
+        progress: Progress {
+            error: Some((0.5, 0.75)),
+            choice: Some((renderer::integrator::IntegratorKind::Bdpt, "it is quicker".into())),
+            ..Progress::default()
+        },
     };
     wait(store.change(paused)).unwrap();
     drop(guard);

@@ -37,6 +37,8 @@ pub struct Provenance {
     pub seed: u64,
     /// The render settings.
     pub settings: serde_json::Value,
+    /// What the integrator `auto` chose, and why.
+    pub choice: Option<serde_json::Value>,
 }
 
 /// The attribute `lightfarm` of an EXR.
@@ -52,6 +54,9 @@ pub struct Metadata {
     pub seed: u64,
     /// The render settings.
     pub settings: serde_json::Value,
+    /// What the integrator `auto` chose, and why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub choice: Option<serde_json::Value>,
     /// The error of the whole.
     pub error: Option<ErrorSummary>,
     /// Mean of each channel with its standard error.
@@ -68,6 +73,7 @@ pub fn encode(image: &MergedImage, about: &Provenance) -> Result<Vec<u8>, String
         scene: about.scene,
         seed: about.seed,
         settings: about.settings.clone(),
+        choice: about.choice.clone(),
         error: image.error,
         channels: image.blocks.image,
         counters: image.counters,

@@ -98,6 +98,19 @@ impl Filter {
         if self.shares() { (self.radius + 0.5).floor() as u32 } else { 0 }
     }
 
+    /// Variance of a pixel over that of a sample, at one sample per pixel: the integral of the squared filter where samples are shared.
+    pub fn spread(&self) -> f64 {
+        const STEPS: u32 = 16;
+        if !self.shares() {
+            return 1.0;
+        }
+        let middle = self.size.map(|n| (n / 2) as f32);
+        let place = |i: u32| (i as f32 + 0.5) / STEPS as f32;
+        let at = |i: u32| Vec2::new(middle[0] + place(i % STEPS), middle[1] + place(i / STEPS));
+        let squares = |i: u32| self.weights(at(i)).iter().map(|(_, _, w)| f64::from(w) * f64::from(w)).sum::<f64>();
+        (0..STEPS * STEPS).map(squares).sum::<f64>() / f64::from(STEPS * STEPS)
+    }
+
     /// How much larger the variance of the mean over `pixels` is than the mean of the pixels' variances over their number, along one
     /// axis (0 = x, 1 = y), where pixels share samples: the integral of the squared sum of their filters, over the sum of the integrals of
     /// their squares.

@@ -4,13 +4,14 @@
 use super::{UnitContext, tile};
 use crate::film::{Counters, Rect, SplatSums, TileSums};
 use crate::math::Ray;
+use crate::path::mis::Heuristic;
 use crate::path::{Always, Chance, Connection, Subpath, Tracer, VertexKind};
 use crate::sampling::{Sampler, SobolSampler};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
 /// Streams of the walks from the lights lie beyond all pixel numbers.
-const LIGHT_STREAM: u64 = 1 << 41;
+pub(super) const LIGHT_STREAM: u64 = 1 << 41;
 /// Blocks of numbers for the connections of vertex i lie beyond those of all walks.
 const CONNECTIONS: u32 = 1 << 20;
 
@@ -51,8 +52,8 @@ pub struct Bidirectional<'a> {
 
 impl<'a> Bidirectional<'a> {
     /// For a unit.
-    pub fn new(c: &UnitContext<'a>) -> Self {
-        let tracer = c.tracer(Some(c.rr_depth));
+    pub fn new(c: &UnitContext<'a>, heuristic: Heuristic) -> Self {
+        let tracer = c.tracer_weighing(Some(c.rr_depth), heuristic);
         let max_depth = c.max_depth as usize;
         Self { tracer, max_depth, threshold: c.threshold, camera: Subpath::default(), light: Subpath::default() }
     }
@@ -60,6 +61,11 @@ impl<'a> Bidirectional<'a> {
     /// What was met so far.
     pub fn counters(&self) -> Counters {
         self.tracer.counters
+    }
+
+    /// Whether a contribution may be added to a sum; counts those that may not.
+    pub fn admit(&mut self, value: Rgb) -> bool {
+        self.tracer.counters.admit(value)
     }
 
     /// The walk from the camera of the last sample.
@@ -173,7 +179,7 @@ pub fn render_tile(
     splats: &mut SplatSums,
     counters: &mut Counters,
 ) -> Option<TileSums> {
-    let mut bdpt = Bidirectional::new(c);
+    let mut bdpt = Bidirectional::new(c, Heuristic::Power);
     let mut film = Film { c, pixel: Rgb::ZERO, splats };
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
     let tile = tile::render(c, rect, samples, |mut s| {

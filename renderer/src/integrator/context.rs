@@ -52,12 +52,17 @@ impl Carried {
 impl<'a> UnitContext<'a> {
     /// Traces and connects walks for the unit; Russian roulette may end them from `rr_depth` edges on, if at all.
     pub fn tracer(&self, rr_depth: Option<u32>) -> Tracer<'a> {
+        self.tracer_weighing(rr_depth, Heuristic::Power)
+    }
+
+    /// The same with another heuristic.
+    pub fn tracer_weighing(&self, rr_depth: Option<u32>, heuristic: Heuristic) -> Tracer<'a> {
         Tracer {
             scene: self.scene,
             camera: &self.view.camera,
             selector: self.selector,
             rr_depth,
-            heuristic: Heuristic::Power,
+            heuristic,
             counters: Counters::default(),
         }
     }

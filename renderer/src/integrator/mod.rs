@@ -4,6 +4,7 @@ pub mod bdpt;
 mod context;
 pub mod light;
 pub mod mmlt;
+pub mod moments;
 pub mod path;
 pub mod strategies;
 mod tile;
@@ -18,15 +19,21 @@ macro_rules! integrators {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub enum IntegratorKind {
             $($(#[$doc])* #[serde(rename = $name)] $variant,)*
+            /// No integrator of its own: trials choose `path`, `bdpt` or `mmlt`.
+            #[serde(rename = "auto")]
+            Auto,
+            /// Not of the image, but of the scatter of `path`'s samples: a trial of `auto`.
+            #[serde(rename = "moments")]
+            Moments,
         }
 
         impl IntegratorKind {
-            /// All of them, by name.
+            /// All that render, by name.
             pub const ALL: &[(&str, Self)] = &[$(($name, Self::$variant)),*];
 
             /// Its name on the command line and in scene files.
             pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $name),* }
+                match self { $(Self::$variant => $name,)* Self::Auto => "auto", Self::Moments => "moments" }
             }
         }
     };
@@ -44,17 +51,26 @@ integrators! {
 }
 
 impl IntegratorKind {
+    /// All names that can be asked for.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        Self::ALL.iter().map(|(n, _)| *n).chain(["auto"])
+    }
+
     /// What its images count in each pixel: of chains, nearly all are mutations.
     pub fn sample_name(self) -> &'static str {
-        if self == Self::Mmlt { "samples and mutations" } else { "samples" }
+        match self {
+            Self::Mmlt => "samples and mutations",
+            Self::Auto => "samples or mutations",
+            _ => "samples",
+        }
     }
 }
 
 impl std::str::FromStr for IntegratorKind {
     type Err = String;
     fn from_str(s: &str) -> Result<Self, String> {
-        let known = || Self::ALL.iter().map(|(n, _)| *n);
-        Self::ALL.iter().find(|(n, _)| *n == s).map(|(_, k)| *k).ok_or_else(|| {
+        let known = || Self::names();
+        Self::ALL.iter().chain(&[("auto", Self::Auto)]).find(|(n, _)| *n == s).map(|(_, k)| *k).ok_or_else(|| {
             let list = known().collect::<Vec<_>>().join(", ");
             match crate::diagnostics::nearest(s, known()) {
                 Some(n) => format!("there is no integrator {s:?}; did you mean {n:?}? (known: {list})"),

@@ -4,6 +4,7 @@
 use super::UnitContext;
 use super::bdpt::{Bidirectional, Sink};
 use crate::path::Connection;
+use crate::path::mis::Heuristic;
 use crate::sampling::{Sampler, SobolSampler, hash_words};
 use std::ops::Range;
 
@@ -41,7 +42,7 @@ impl Strategies {
     /// Renders samples `samples` of each pixel; `None` when stopped.
     pub fn render(c: &UnitContext<'_>, samples: Range<u32>) -> Option<Self> {
         let mut sums = Self::new(c, c.max_depth.clamp(2, MAX_EDGES));
-        let mut bdpt = Bidirectional::new(c);
+        let mut bdpt = Bidirectional::new(c, Heuristic::Power);
         for y in 0..sums.height {
             for x in 0..sums.width {
                 if x == 0 && (c.stopped)() {

@@ -34,7 +34,9 @@ impl PassDocument {
     /// Reads and checks what [`PassDocument::to_json`] wrote.
     pub fn from_json(bytes: &[u8]) -> Result<Self, String> {
         let document: Self = serde_json::from_slice(bytes).map_err(|e| format!("not a pass document: {e}"))?;
-        document.settings.validate().map_err(|e| e.to_string())?;
+        for settings in std::iter::once(&document.settings).chain(document.plan.settings.as_deref()) {
+            settings.validate().map_err(|e| e.to_string())?;
+        }
         if document.plan.digest() != document.plan_digest {
             return Err("the numbers of the plan changed on the way through text".into());
         }

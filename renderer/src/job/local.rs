@@ -1,5 +1,6 @@
 //! A job in this process: the farm's planner, units and merger, with threads in place of workers.
 
+use super::auto::Choice;
 use super::merger::Merger;
 use super::plan::PassPlan;
 use super::run::{Stop, UnitError, run_unit};
@@ -35,6 +36,8 @@ pub struct LocalOutcome {
     pub image: MergedImage,
     /// How the mutations of a Metropolis job fared.
     pub chains: ChainStats,
+    /// What `auto` chose.
+    pub choice: Option<Choice>,
     /// Whether it was stopped before its budget.
     pub interrupted: bool,
 }
@@ -53,18 +56,18 @@ pub fn render_local(
         let plan = merger.plan().clone();
         run_pass(scene, settings, options, &plan, stop, &mut merger, observer)?;
         if stop.stopped() && !merger.pass_complete() {
-            return Ok(LocalOutcome { image: merger.image(), chains: merger.chain_stats(), interrupted: true });
+            return Ok(outcome(&merger, true));
         }
         observer(LocalEvent::PassDone(&merger));
         let time_up = settings.budget.time_s.is_some_and(|t| started.elapsed().as_secs_f64() >= t);
         if merger.advance(time_up || stop.stopped()).is_none() {
-            return Ok(LocalOutcome {
-                image: merger.image(),
-                chains: merger.chain_stats(),
-                interrupted: stop.stopped(),
-            });
+            return Ok(outcome(&merger, stop.stopped()));
         }
     }
+}
+
+fn outcome(merger: &Merger, interrupted: bool) -> LocalOutcome {
+    LocalOutcome { image: merger.image(), chains: merger.chain_stats(), choice: merger.choice().cloned(), interrupted }
 }
 
 /// What the threads of a pass share.

@@ -1,5 +1,6 @@
 //! A job: settings, passes, units, results and their merge. The same code runs in `lightfarm render` and on the farm.
 
+mod auto;
 mod bytes;
 mod codec;
 pub mod document;
@@ -7,14 +8,17 @@ mod local;
 mod merger;
 mod metropolis;
 mod plan;
+mod rendering;
 mod run;
 mod settings;
 mod unit;
 
+pub use auto::{Choice, Outcome};
 pub use codec::DecodeError;
 pub use local::{LocalEvent, LocalOptions, LocalOutcome, render_local};
-pub use merger::{FoldError, Merger};
+pub use merger::Merger;
 pub use plan::{GroupRange, Learned, Part, PassPlan, Planner, Sampling};
+pub use rendering::FoldError;
 pub use run::{Stop, UnitError, render_strategies, run_unit};
 pub use settings::{Budget, RenderOptions, RenderSettings, SettingsError};
 pub use unit::{Unit, UnitKind, UnitResult};

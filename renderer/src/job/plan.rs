@@ -134,6 +134,10 @@ pub struct PassPlan {
     pub chain_weight: u32,
     /// The job ends with this pass.
     pub last: bool,
+    /// The pass of the job with which the render began that this pass belongs to: a job by `auto` is several, one after the other.
+    pub first: u32,
+    /// What the pass renders with in place of the job's settings: one of the renders of a job by `auto`.
+    pub settings: Option<Box<RenderSettings>>,
 }
 
 impl PassPlan {
@@ -141,6 +145,16 @@ impl PassPlan {
     pub fn digest(&self) -> Digest {
         // A plain struct of numbers always serialises.
         Digest::of(&serde_json::to_vec(self).unwrap_or_default())
+    }
+
+    /// What it renders with, in a job of these settings.
+    pub fn settings<'a>(&'a self, job: &'a RenderSettings) -> &'a RenderSettings {
+        self.settings.as_deref().unwrap_or(job)
+    }
+
+    /// Its number in the render that it belongs to.
+    pub fn own_pass(&self) -> u32 {
+        self.pass - self.first
     }
 
     /// Samples per pixel of the pass; of a Metropolis job, mutations per pixel.
@@ -349,8 +363,8 @@ impl Planner {
     fn sampling(&self) -> Sampling {
         match self.settings.integrator {
             IntegratorKind::Light => Sampling::Paths,
-            IntegratorKind::Bdpt => Sampling::SplattingTiles,
-            IntegratorKind::Path | IntegratorKind::Mmlt => Sampling::Tiles,
+            IntegratorKind::Bdpt | IntegratorKind::Moments => Sampling::SplattingTiles,
+            IntegratorKind::Path | IntegratorKind::Mmlt | IntegratorKind::Auto => Sampling::Tiles,
         }
     }
 
@@ -387,6 +401,8 @@ impl Planner {
             chains: None,
             chain_weight: 0,
             last,
+            first: 0,
+            settings: None,
         }
     }
 }

@@ -90,6 +90,7 @@ fn run(
     unit: &Unit,
     stop: &Stop,
 ) -> Result<Option<UnitResult>, UnitError> {
+    let (settings, pass) = (plan.settings(settings), plan.own_pass());
     let Some(view) = View::new(scene, settings.width, settings.height, settings.filter) else { return Ok(None) };
     let learned = (plan.light_weights.len() == scene.lights.len() && !scene.lights.is_empty())
         .then(|| LightSelector::defensive(&plan.light_weights, UNIFORM_SHARE));
@@ -108,7 +109,9 @@ fn run(
     };
     let mut result = UnitResult::default();
     let done = match unit.kind {
-        UnitKind::Tile { rect, start, end, .. } => run_tile(&context, plan, rect, start..end, &mut result),
+        UnitKind::Tile { rect, start, end, .. } => {
+            run_tile(&context, (plan, settings.integrator), rect, start..end, &mut result)
+        }
         UnitKind::Paths { start, end } => {
             let mut splats = SplatSums::new(settings.width, settings.height);
             let sums = integrator::light::trace_paths(&context, start..end, &mut splats, &mut result.counters);
@@ -121,10 +124,10 @@ fn run(
         UnitKind::Bootstrap { start, end } => {
             let Some(constants) = &plan.chains else { return Ok(None) };
             // The pilot's samples are a preview.
-            let mut splats = (plan.pass == 0).then(|| SplatSums::new(settings.width, settings.height));
+            let mut splats = (pass == 0).then(|| SplatSums::new(settings.width, settings.height));
             let (splat, counters) = (splats.as_mut(), &mut result.counters);
             result.bootstrap =
-                mmlt::run_bootstrap(&context, constants, &settings.mmlt, plan.pass, start..end, splat, counters);
+                mmlt::run_bootstrap(&context, constants, &settings.mmlt, pass, start..end, splat, counters);
             result.splats = splats;
             result.bootstrap.is_some()
         }
@@ -135,17 +138,11 @@ fn run(
                 return Ok(None);
             };
             let Some(starts) = starts.get(first as usize..end as usize) else { return Ok(None) };
-            let task = ChainTask {
-                pool: plan.pass.saturating_sub(1),
-                edges: *edges,
-                first,
-                starts,
-                mutations: *mutations,
-                b: *b,
-            };
+            let task =
+                ChainTask { pool: pass.saturating_sub(1), edges: *edges, first, starts, mutations: *mutations, b: *b };
             let mut splats = SplatSums::new(settings.width, settings.height);
             let (splat, counters) = (&mut splats, &mut result.counters);
-            result.chains = mmlt::run_chains(&context, constants, &settings.mmlt, plan.pass, &task, splat, counters)
+            result.chains = mmlt::run_chains(&context, constants, &settings.mmlt, pass, &task, splat, counters)
                 .map_err(|source| UnitError::Mismatch { pass: unit.pass, unit: unit.id, source })?;
             result.splats = Some(splats);
             result.chains.is_some()
@@ -203,11 +200,22 @@ pub fn render_strategies(
 }
 
 /// A tile of the job's ordinary samples.
-fn run_tile(c: &UnitContext<'_>, plan: &PassPlan, rect: Rect, samples: Range<u32>, result: &mut UnitResult) -> bool {
+fn run_tile(
+    c: &UnitContext<'_>,
+    (plan, integrator): (&PassPlan, IntegratorKind),
+    rect: Rect,
+    samples: Range<u32>,
+    result: &mut UnitResult,
+) -> bool {
     if plan.sampling == Sampling::SplattingTiles {
         let mut splats = SplatSums::new(c.view.width, c.view.height);
         result.paths = rect.area() as u64 * u64::from(samples.end - samples.start);
-        result.tile = integrator::bdpt::render_tile(c, rect, samples, &mut splats, &mut result.counters);
+        let render = if integrator == IntegratorKind::Moments {
+            integrator::moments::render_tile
+        } else {
+            integrator::bdpt::render_tile
+        };
+        result.tile = render(c, rect, samples, &mut splats, &mut result.counters);
         result.splats = Some(splats);
     } else {
         result.tile = integrator::path::render_tile(c, rect, samples, &mut result.counters);

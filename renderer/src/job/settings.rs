@@ -1,3 +1,4 @@
+use super::auto::Choice;
 use crate::film::Filter;
 use crate::film::exr::Provenance;
 use crate::integrator::IntegratorKind;
@@ -82,9 +83,8 @@ impl RenderOptions {
         check_counts(integrator, self.spp, self.mpp)?;
         if self.mmlt.is_some() && integrator != IntegratorKind::Mmlt {
             let name = integrator.name();
-            return Err(format!(
-                "--mmlt is for mmlt, but {name} would render; leave it out, or give --integrator mmlt"
-            ));
+            let would = if integrator == IntegratorKind::Auto { "chooses" } else { "would render" };
+            return Err(format!("--mmlt is for mmlt, but {name} {would}; leave it out, or give --integrator mmlt"));
         }
         self.mmlt.map_or(Ok(()), |o| o.validate())?;
         self.size.map_or(Ok(()), |(width, height)| check_size(width, height))
@@ -121,8 +121,6 @@ impl RenderSettings {
         let budget = budget(options, scene, integrator);
         let (width, height) = options.size.or(scene.size).unwrap_or((768, 432));
         let depth = options.max_depth.or(scene.max_depth).unwrap_or(-1);
-        let sobol = matches!(integrator, IntegratorKind::Path | IntegratorKind::Bdpt);
-        let groups = if sobol { REPLICATES } else { SPLAT_REPLICATES };
         let settings = Self {
             integrator,
             budget,
@@ -132,7 +130,7 @@ impl RenderSettings {
             max_depth: if depth == -1 { None } else { Some(u32::try_from(depth).map_err(|_| bad_depth(depth))?) },
             rr_depth: scene.rr_depth.unwrap_or(5),
             seed: options.seed.or(scene.seed).unwrap_or(0),
-            replicates: budget.spp.map_or(groups, |n| groups.min(n.max(1))),
+            replicates: groups(integrator, &budget),
             mmlt: options.mmlt.unwrap_or_default(),
         };
         settings.validate()?;
@@ -144,10 +142,24 @@ impl RenderSettings {
         Filter::new(&self.filter, self.width, self.height).reach()
     }
 
-    /// What an image made with these settings says of itself.
-    pub fn provenance(&self, scene: Digest) -> Provenance {
-        // A plain struct of numbers always serialises.
-        Provenance { scene, seed: self.seed, settings: serde_json::to_value(self).unwrap_or_default() }
+    /// The same by another integrator, with `count` samples (mutations) per pixel in place of the samples that these allow.
+    pub fn rendered_by(&self, integrator: IntegratorKind, count: Option<u32>) -> Self {
+        let (spp, mpp) = if integrator == IntegratorKind::Mmlt { (None, count) } else { (count, None) };
+        let budget = Budget { spp, mpp, ..self.budget };
+        Self { integrator, budget, replicates: groups(integrator, &budget), ..self.clone() }
+    }
+
+    /// Pixels of the film.
+    pub fn pixels(&self) -> f64 {
+        f64::from(self.width) * f64::from(self.height)
+    }
+
+    /// What an image made with these settings says of itself; by `auto`, what was chosen as well.
+    pub fn provenance(&self, scene: Digest, choice: Option<&Choice>) -> Provenance {
+        // Plain structs of numbers always serialise.
+        let settings = serde_json::to_value(self).unwrap_or_default();
+        let choice = choice.map(|c| serde_json::to_value(c).unwrap_or_default());
+        Provenance { scene, seed: self.seed, settings, choice }
     }
 
     /// Checks what came over the wire or from a user.
@@ -181,6 +193,13 @@ impl RenderSettings {
     }
 }
 
+/// Replicate groups of an integrator.
+fn groups(integrator: IntegratorKind, budget: &Budget) -> u32 {
+    let sobol = matches!(integrator, IntegratorKind::Path | IntegratorKind::Bdpt);
+    let groups = if sobol { REPLICATES } else { SPLAT_REPLICATES };
+    budget.spp.map_or(groups, |n| groups.min(n.max(1)))
+}
+
 /// Checks the size of a film.
 fn check_size(width: u32, height: u32) -> Result<(), String> {
     let pixels = u64::from(width) * u64::from(height);
@@ -197,6 +216,9 @@ fn check_counts(integrator: IntegratorKind, spp: Option<u32>, mpp: Option<u32>) 
     let chains = integrator == IntegratorKind::Mmlt;
     if chains && spp.is_some() {
         return Err("mmlt makes mutations, not samples; give --mpp in place of --spp".into());
+    }
+    if integrator == IntegratorKind::Auto && mpp.is_some() {
+        return Err("auto counts in samples of path, whatever it chooses; give --spp in place of --mpp".into());
     }
     if !chains && mpp.is_some() {
         return Err(format!("{} makes samples, not mutations; give --spp in place of --mpp", integrator.name()));

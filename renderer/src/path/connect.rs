@@ -214,9 +214,9 @@ impl Tracer<'_> {
         pdf_rev_before: f64,
     ) -> f64 {
         let h = self.heuristic;
-        let before = camera.step(t - 2, pdf_rev_before, false);
+        let before = camera.step(h, t - 2, pdf_rev_before, false);
         let sum = h.fold(camera.vertices[t - 3].tail, before);
-        let reach = if camera.vertices[t - 2].delta { 0.0 } else { direct };
+        let reach = if camera.vertices[t - 2].delta || !h.has_path() { 0.0 } else { direct };
         h.weight(0.0, h.fold(sum, Step { ratio: pdf_rev / pdf_fwd, reach }), 1.0)
     }
 
@@ -258,7 +258,7 @@ impl Tracer<'_> {
         let weight = |way: &Way| {
             let camera_sum = camera.beyond(h, t - 1, onwards * way.density(at.medium()), back);
             // The camera walk that hits the light: its density over that of sampling the light, in the same measure.
-            let reach = if li.delta { 0.0 } else { direct };
+            let reach = if li.delta || !h.has_path() { 0.0 } else { direct };
             let ratio = f64::from(pdf_dir) * way.density(None) / f64::from(pdf);
             let light_sum = h.fold(0.0, Step { ratio, reach });
             h.weight(light_sum, camera_sum, direct)

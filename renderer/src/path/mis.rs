@@ -23,6 +23,8 @@ pub enum Heuristic {
     /// Proportional to its square (Veach 1997, equation 9.11).
     #[default]
     Power,
+    /// The power heuristic among the strategies that `path` does not have, s > 1, and the one at hand.
+    Beyond,
 }
 
 /// One vertex on the way outwards from a connection.
@@ -40,11 +42,17 @@ impl Heuristic {
     pub fn fold(self, tail: f64, step: Step) -> f64 {
         let (ratio, reach) = match self {
             Self::Balance => (step.ratio, step.reach),
-            Self::Power => (step.ratio * step.ratio, step.reach * step.reach),
+            Self::Power | Self::Beyond => (step.ratio * step.ratio, step.reach * step.reach),
         };
         let beyond = reach + tail;
         // Nothing lies beyond: the ratio may be infinite then.
         if beyond == 0.0 { 0.0 } else { ratio * beyond }
+    }
+
+    /// Whether the strategies of `path` (s = 0 and s = 1) count.
+    #[inline]
+    pub fn has_path(self) -> bool {
+        self != Self::Beyond
     }
 
     /// Weight of a strategy from the sums on both sides of its connection, whose density is `own` times the product form.
@@ -52,7 +60,7 @@ impl Heuristic {
     pub fn weight(self, light: f64, camera: f64, own: f64) -> f64 {
         let own = match self {
             Self::Balance => own,
-            Self::Power => own * own,
+            Self::Power | Self::Beyond => own * own,
         };
         own / (own + light + camera)
     }

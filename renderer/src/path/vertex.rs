@@ -198,9 +198,10 @@ impl Subpath {
     /// The step outwards past vertex `i`, which the other end's walk makes with density `pdf_rev`. `end` says whether `i` is the vertex
     /// that is connected, and so not delta whatever the walk did there later.
     #[inline]
-    pub fn step(&self, i: usize, pdf_rev: f64, end: bool) -> Step {
+    pub fn step(&self, heuristic: Heuristic, i: usize, pdf_rev: f64, end: bool) -> Step {
         let ratio = pdf_rev / self.vertices[i].pdf_fwd;
         let exists = match (&self.light, i) {
+            (Some(_), 0 | 1) if !heuristic.has_path() => false,
             // The camera walk that hits the light.
             (Some(light), 0) => !light.flags.is_delta(),
             // Nothing hits a lens.
@@ -224,8 +225,8 @@ impl Subpath {
             sum = self.vertices[end - 2].tail;
         }
         if end >= 1 {
-            sum = heuristic.fold(sum, self.step(end - 1, pdf_rev_before, false));
+            sum = heuristic.fold(sum, self.step(heuristic, end - 1, pdf_rev_before, false));
         }
-        heuristic.fold(sum, self.step(end, pdf_rev, true))
+        heuristic.fold(sum, self.step(heuristic, end, pdf_rev, true))
     }
 }

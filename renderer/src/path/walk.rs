@@ -247,7 +247,7 @@ impl Tracer<'_> {
             _ => v.edge.backward,
         };
         let before = path.vertices.get(last.wrapping_sub(2)).map_or(0.0, |v| v.tail);
-        let step = path.step(last - 1, pdf_back, false);
+        let step = path.step(self.heuristic, last - 1, pdf_back, false);
         path.vertices[last - 1].tail = self.heuristic.fold(before, step);
         path.vertices[last].delta = s.lobe.delta;
     }

@@ -3,6 +3,7 @@ use crate::scenes;
 use renderer::integrator::bdpt::{Bidirectional, Sink};
 use renderer::integrator::{Carried, UnitContext, View};
 use renderer::path::Connection;
+use renderer::path::mis::Heuristic;
 use renderer::sampling::{IndependentSampler, Sampler};
 use renderer::scene::desc::FilterDesc;
 use std::collections::BTreeMap;
@@ -60,7 +61,7 @@ fn strategies_without_weights_agree_with_each_other_and_with_their_weighted_sum(
     let groups: Vec<Sums> = (0..u64::from(GROUPS))
         .map(|group| {
             let mut sums = Sums::default();
-            let mut bdpt = Bidirectional::new(&context);
+            let mut bdpt = Bidirectional::new(&context, Heuristic::Power);
             for index in 0..SAMPLES {
                 let mut camera = IndependentSampler::new([61, group, index]);
                 let mut light = IndependentSampler::new([62, group, index]);

@@ -81,6 +81,16 @@ pub fn pilot(settings: &RenderSettings) -> PassPlan {
     plan(settings, 0, parts, chains, 0, false)
 }
 
+/// Samples of the pilot and of the pools for each mutation of a long job.
+pub fn pools_per_mutation(settings: &RenderSettings) -> f64 {
+    pool_samples(settings, PILOT_SHARE + f64::from(settings.mmlt.pool_share), 1) / pixels(settings)
+}
+
+/// Share of the work of a job that chains do.
+pub fn chain_share(settings: &RenderSettings) -> f64 {
+    1.0 - PILOT_SHARE - f64::from(settings.mmlt.pool_share)
+}
+
 /// Pool samples that cost the given share of so many mutations per pixel. A sample traces both walks, and a path of every length in
 /// about every second way; a mutation, one path of a short length.
 fn pool_samples(settings: &RenderSettings, share: f64, mpp: u32) -> f64 {
@@ -123,6 +133,8 @@ fn plan(
         chains: Some(chains),
         chain_weight,
         last,
+        first: 0,
+        settings: None,
     }
 }
 
@@ -257,9 +269,7 @@ impl Metropolis {
     /// The chains of a pass and its ordinary samples, group after group.
     fn chains_of(&self, settings: &RenderSettings, pass: u32, of_pass: &Share, films: &[GroupFilm]) -> Vec<Part> {
         let groups = f64::from(settings.replicates);
-        let budget =
-            f64::from(of_pass.density) * pixels(settings) * (1.0 - PILOT_SHARE - f64::from(settings.mmlt.pool_share))
-                / groups;
+        let budget = f64::from(of_pass.density) * pixels(settings) * chain_share(settings) / groups;
         let lengths: Vec<u32> = lengths(settings).collect();
         // Mutations by what a length contributes, over the root of what one costs; a tenth for all alike.
         let contribution = |edges: &u32| self.contributions.get(edges).copied().unwrap_or_default();

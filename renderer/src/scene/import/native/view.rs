@@ -8,7 +8,8 @@ use crate::scene::import::number::Bound;
 use crate::scene::import::transform::{half_turn, without_scale};
 
 /// Names of the integrators, which belong to a higher layer: a test of the command compares the lists.
-const INTEGRATORS: [(&str, &str); 4] = [("path", "path"), ("light", "light"), ("bdpt", "bdpt"), ("mmlt", "mmlt")];
+const INTEGRATORS: [(&str, &str); 5] =
+    [("path", "path"), ("light", "light"), ("bdpt", "bdpt"), ("mmlt", "mmlt"), ("auto", "auto")];
 /// Most pixels along a side.
 const MAX_SIDE: i64 = 1 << 16;
 

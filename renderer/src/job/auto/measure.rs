@@ -1,0 +1,150 @@
+//! What the pictures of trials tell: the error that one sample of each pixel would leave.
+
+use crate::film::GroupFilm;
+use crate::job::rendering::Rendering;
+
+/// Keeps relative errors from dividing by the darkness of black pixels, as everywhere.
+const FLOOR: f64 = 0.01;
+/// Side of the blocks that are compared, in pixels of the small film.
+const BLOCK: usize = 4;
+/// Squared standard errors beyond which a block is darker for a reason: light that was not found.
+const CERTAIN: f64 = 16.0;
+
+/// Means and scatter of a trial's groups.
+pub struct Sample {
+    width: usize,
+    height: usize,
+    groups: Vec<Vec<[f64; 3]>>,
+}
+
+/// What is left of an image when its parts are taken apart.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// What ordinary samples found.
+    Tiles,
+    /// What chains found.
+    Splats,
+}
+
+impl Sample {
+    /// Of a trial that is complete.
+    pub fn new(trial: &Rendering, part: Part) -> Self {
+        let s = trial.settings();
+        let pixels = 0..s.width as usize * s.height as usize;
+        let value = |g: &GroupFilm, i: usize| match part {
+            Part::Whole => g.pixel(i).0,
+            Part::Tiles => g.parts(i).0,
+            Part::Splats => g.parts(i).1,
+        };
+        let groups = trial.groups().iter().map(|g| pixels.clone().map(|i| value(g, i)).collect()).collect();
+        Self { width: s.width as usize, height: s.height as usize, groups }
+    }
+
+    /// Mean over the groups.
+    fn mean(&self, i: usize) -> [f64; 3] {
+        let n = self.groups.len().max(1) as f64;
+        std::array::from_fn(|c| self.groups.iter().map(|g| g[i][c]).sum::<f64>() / n)
+    }
+
+    /// Variance of one group's value.
+    fn variance(&self, i: usize) -> [f64; 3] {
+        let (mean, n) = (self.mean(i), self.groups.len() as f64);
+        let square = |v: f64| v * v;
+        std::array::from_fn(|c| self.groups.iter().map(|g| square(g[i][c] - mean[c])).sum::<f64>() / (n - 1.0).max(1.0))
+    }
+
+    /// `1 / (I^2 + 0.01)` of every pixel, I being the mean of two pictures of the same size. All that is compared is weighed alike: what
+    /// a pixel that few samples have found bright excuses, it excuses for all.
+    pub fn weights(&self, other: &Self) -> Weights {
+        let of = |i: usize| {
+            let (a, b) = (self.mean(i), other.mean(i));
+            std::array::from_fn(|c| 1.0 / (0.25 * (a[c] + b[c]) * (a[c] + b[c]) + FLOOR))
+        };
+        Weights { width: self.width, height: self.height, pixels: (0..self.width * self.height).map(of).collect() }
+    }
+
+    /// Mean relative variance of one group. Where `own` says so, pixels that this picture has brighter than the weights know are weighed
+    /// by that: it may be finer, and a lamp that covers a few pixels here covers none there.
+    pub fn relative_variance(&self, weights: &Weights, own: bool) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..self.width * self.height {
+            let weight = weights.pixels[weights.at(i % self.width, i / self.width, self.width, self.height)];
+            let (v, mean) = (self.variance(i), self.mean(i));
+            let weight = |c: usize| if own { weight[c].min(1.0 / (mean[c] * mean[c] + FLOOR)) } else { weight[c] };
+            sum += (0..3).map(|c| v[c] * weight(c)).sum::<f64>();
+        }
+        sum / (3 * self.width * self.height) as f64
+    }
+
+    /// Mean relative variance of what this picture tells the second moment of, beyond the square of the mean that others tell.
+    pub fn relative_moment(&self, weights: &Weights, mean: [&Self; 2]) -> f64 {
+        let of = |i: usize| {
+            let (moment, a, b) = (self.mean(i), mean[0].mean(i), mean[1].mean(i));
+            let excess = |c: usize| moment[c] - 0.25 * (a[c] + b[c]) * (a[c] + b[c]);
+            (0..3).map(|c| weights.pixels[i][c] * excess(c)).sum::<f64>()
+        };
+        let pixels = self.width * self.height;
+        (0..pixels).map(of).sum::<f64>() / (3 * pixels) as f64
+    }
+
+    /// Relative variance of one sample for each of `samples` in a pixel that light must at least have which `full` shows and this trial
+    /// did not find: what n samples have missed has a probability of about 1 / n at most, and so a variance of n times its square.
+    pub fn unseen(&self, full: &Self, samples: f64) -> f64 {
+        let (across, down) = (full.width.div_ceil(BLOCK), full.height.div_ceil(BLOCK));
+        let mut sum = 0.0;
+        for block in 0..across * down {
+            let (own, theirs) = (self.block(block, across, full), full.block(block, across, full));
+            let (Some(own), Some(theirs)) = (own, theirs) else { continue };
+            let lack = theirs.mean - own.mean;
+            let noise = own.variance + theirs.variance;
+            if lack > 0.0 {
+                let excess = (lack * lack - CERTAIN * noise).max(0.0);
+                // Of the block, not of one of its pixels.
+                sum += excess / (theirs.mean * theirs.mean + FLOOR) * samples * own.pixels;
+            }
+        }
+        sum / (across * down) as f64
+    }
+
+    /// A block of the film `of`, here.
+    fn block(&self, block: usize, across: usize, of: &Self) -> Option<Block> {
+        let scale = |v: usize, to: usize, from: usize| (v.min(from) * to).div_ceil(from);
+        let (x, y) = (block % across * BLOCK, block / across * BLOCK);
+        let (x0, x1) = (scale(x, self.width, of.width), scale(x + BLOCK, self.width, of.width));
+        let (y0, y1) = (scale(y, self.height, of.height), scale(y + BLOCK, self.height, of.height));
+        let pixels = ((x1 - x0) * (y1 - y0)) as f64;
+        let value = |g: &Vec<[f64; 3]>| {
+            let rows = (y0..y1).flat_map(|y| &g[y * self.width + x0..y * self.width + x1]);
+            rows.map(|v| v.iter().sum::<f64>() / 3.0).sum::<f64>() / pixels
+        };
+        let values: Vec<f64> = self.groups.iter().map(value).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let scatter: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+        (pixels > 0.0).then(|| Block { mean, variance: scatter / ((n - 1.0).max(1.0) * n), pixels })
+    }
+}
+
+/// A block of pixels.
+struct Block {
+    mean: f64,
+    /// Variance of the mean.
+    variance: f64,
+    pixels: f64,
+}
+
+/// `1 / (I^2 + 0.01)` by pixel.
+pub struct Weights {
+    width: usize,
+    height: usize,
+    pixels: Vec<[f64; 3]>,
+}
+
+impl Weights {
+    /// The place of a pixel of a film of another size.
+    fn at(&self, x: usize, y: usize, width: usize, height: usize) -> usize {
+        y * self.height / height * self.width + x * self.width / width
+    }
+}
