@@ -38,7 +38,10 @@ impl Options {
             let known: Vec<&str> = ROWS.iter().map(|r| r.name).collect();
             return Err(format!("no row's name contains {word:?}; there are: {}", known.join(", ")));
         }
-        Ok(ROWS.iter().filter(|r| self.only.is_empty() || self.only.iter().any(|w| r.name.contains(w.as_str()))).collect())
+        Ok(ROWS
+            .iter()
+            .filter(|r| self.only.is_empty() || self.only.iter().any(|w| r.name.contains(w.as_str())))
+            .collect())
     }
 }
 

@@ -94,7 +94,18 @@ impl Probe {
         let mut diagnostics = Diagnostics::default();
         let scene = Scene::build(desc, what, &mut diagnostics);
         let said = || diagnostics.list.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-        self.holds(scene.is_some() && diagnostics.list.is_empty(), || format!("{what}: the scene is refused: {}", said()));
+        self.holds(scene.is_some() && diagnostics.list.is_empty(), || {
+            format!("{what}: the scene is refused: {}", said())
+        });
+        scene
+    }
+
+    /// Builds a description that is sound, but of which a warning must be given that says `said`.
+    pub fn build_warned(&mut self, what: &str, desc: SceneDesc, said: &str) -> Option<Scene> {
+        let mut diagnostics = Diagnostics::default();
+        let scene = Scene::build(desc, what, &mut diagnostics);
+        let told = diagnostics.list.iter().any(|d| d.message.contains(said));
+        self.holds(scene.is_some() && told, || format!("{what}: no warning says {said:?}: {:?}", diagnostics.list));
         scene
     }
 
@@ -142,13 +153,13 @@ impl Probe {
             let (x, y) = (whole(a, c), whole(b, c));
             self.known_to(what, &x, share);
             self.known_to(what, &y, share);
-            self.welch(format!("{what}, channel {c}"), &x, &y);
+            self.welch(format!("{what}, channel {c}"), &x, &y, ROUNDING);
         }
         for i in 0..a.blocks.std_error.len() {
             for c in 0..3 {
                 let (x, y) = (block(a, i, c), block(b, i, c));
                 if [&x, &y].iter().all(|e| e.mean > 0.0 && e.half_width(0.99) <= BLOCK_NOISE * e.mean) {
-                    self.welch(format!("{what}, block {i}, channel {c}"), &x, &y);
+                    self.welch(format!("{what}, block {i}, channel {c}"), &x, &y, ROUNDING);
                 }
             }
         }
@@ -156,10 +167,15 @@ impl Probe {
 
     /// The image mean against what it must be, known to `share` of it.
     pub fn is(&mut self, what: &str, image: &MergedImage, truth: [f64; 3], share: f64) {
+        self.is_after(what, image, truth, share, ROUNDING);
+    }
+
+    /// The same where so many operations may have rounded, each alike, that their relative error is as large as `rounding`.
+    pub fn is_after(&mut self, what: &str, image: &MergedImage, truth: [f64; 3], share: f64, rounding: f64) {
         for (c, truth) in truth.into_iter().enumerate() {
             let x = whole(image, c);
             self.known_to(what, &x, share);
-            self.welch(format!("{what}, channel {c}"), &x, &Estimate::exact(truth));
+            self.welch(format!("{what}, channel {c}"), &x, &Estimate::exact(truth), rounding);
         }
     }
 
@@ -180,8 +196,8 @@ impl Probe {
         });
     }
 
-    fn welch(&mut self, what: String, x: &Estimate, y: &Estimate) {
-        let p = x.welch(y, ROUNDING).map_or(f64::NAN, |w| w.p);
+    fn welch(&mut self, what: String, x: &Estimate, y: &Estimate, rounding: f64) {
+        let p = x.welch(y, rounding).map_or(f64::NAN, |w| w.p);
         self.test(format!("{what}: {:.6} and {:.6}", x.mean, y.mean), p);
     }
 }

@@ -27,6 +27,8 @@ pub struct Outcome {
     pub least_p: f64,
     /// What it must not be below.
     pub allowed_p: f64,
+    /// The test with the least p-value.
+    pub least_test: String,
     /// Seconds it took.
     pub seconds: f64,
     /// Figures worth telling.
@@ -40,7 +42,8 @@ impl Outcome {
     pub fn new(row: &Row, probe: Probe, level: f64, seconds: f64) -> Self {
         let Probe { checks, tests, mut failures, figures, .. } = probe;
         let allowed_p = statcheck::sidak(level, tests.len().max(1));
-        let least_p = tests.iter().map(|t| t.1).fold(1.0, f64::min);
+        let least = tests.iter().min_by(|a, b| a.1.total_cmp(&b.1)).cloned();
+        let (least_test, least_p) = least.unwrap_or((String::new(), 1.0));
         // NaN fails, too.
         let rejected = tests.iter().filter(|t| !(t.1 >= allowed_p));
         failures.extend(rejected.map(|(what, p)| format!("{what}: p = {p:.2e}, at least {allowed_p:.2e} is allowed")));
@@ -48,7 +51,8 @@ impl Outcome {
             failures.push("nothing was checked".into());
         }
         let (name, what, tests) = (row.name, row.what, tests.len());
-        Self { name, what, passed: failures.is_empty(), checks, tests, least_p, allowed_p, seconds, figures, failures }
+        let passed = failures.is_empty();
+        Self { name, what, passed, checks, tests, least_p, allowed_p, least_test, seconds, figures, failures }
     }
 
     /// Its line of the table, and below it what is to be said of it.

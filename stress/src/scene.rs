@@ -143,14 +143,14 @@ pub fn room() -> SceneDesc {
     }
 }
 
-/// The room with fog in a ball without a surface.
+/// The room with fog in a ball without a surface, the point light outside of it: in fog that has no finite variance.
 pub fn foggy_room(extinction: f32) -> SceneDesc {
     let mut desc = room();
     let phase = renderer::medium::Phase::HenyeyGreenstein { g: 0.5 };
     desc.media = Medium::new(Rgb::splat(extinction), Rgb::new(0.9, 0.8, 0.7), phase).into_iter().collect();
     desc.materials.push(Material::Null);
     let null = desc.materials.len() as u32 - 1;
-    let mut cloud = shape(ShapeKind::Sphere, at(DVec3::new(-0.3, 0.35, 0.2), 0.4), null);
+    let mut cloud = shape(ShapeKind::Sphere, at(DVec3::new(0.35, 0.4, 0.2), 0.35), null);
     cloud.interior = Some(MediumId(0));
     desc.shapes.push(cloud);
     desc

@@ -139,7 +139,7 @@ fn camera(scene: &Scene) -> Camera {
 /// Sums of one group (two for a splatting job), the means of all groups, first hits, and the merged image.
 fn film_bytes(s: &RenderSettings) -> u64 {
     let pixels = u64::from(s.width) * u64::from(s.height);
-    pixels * (2 * 28 + 12 * u64::from(s.replicates) + 32 + 60)
+    pixels * (2 * 28 + 12 * u64::from(s.replicates) + 64 + 60)
 }
 
 /// Bytes that the process holds in memory.

@@ -42,7 +42,10 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     let rows = options.rows().map_err(Failure::Usage)?;
     if args.list {
         for row in rows {
-            console.result(format!("{:<14} {}", row.name, row.what), &serde_json::json!({"row": row.name, "what": row.what}));
+            console.result(
+                format!("{:<14} {}", row.name, row.what),
+                &serde_json::json!({"row": row.name, "what": row.what}),
+            );
         }
         return Ok(());
     }
@@ -53,6 +56,9 @@ pub fn run(args: Args, console: &Console) -> Outcome {
     std::fs::write(&args.output, report.table())
         .map_err(|e| Failure::Machine(format!("error: {} can't be written: {e}", args.output.display())))?;
     let summary = report.summary();
-    console.result(format!("\n{summary}"), &serde_json::json!({"event": "summary", "passed": report.passed, "text": summary}));
+    console.result(
+        format!("\n{summary}"),
+        &serde_json::json!({"event": "summary", "passed": report.passed, "text": summary}),
+    );
     if report.passed { Ok(()) } else { Err(Failure::Input(format!("error: {summary}"))) }
 }

@@ -105,6 +105,11 @@ impl Scene {
             }
         }
         let mut geometry = Geometry { meshes: builder.meshes, objects };
+        let described: Vec<Option<f64>> = shapes
+            .iter()
+            .zip(&geometry.objects)
+            .map(|(shape, object)| lamps::described_area(shape, object, &geometry))
+            .collect();
         geometry.bake();
         let bounds = geometry.bounds();
         if let Err(e) = crate::camera::Camera::new(&camera, 16, 16) {
@@ -122,6 +127,10 @@ impl Scene {
                 lights.push(light);
                 lights.len() as u32 - 1
             });
+            if let (Some(area), Some(_)) = (described.get(i).copied().flatten(), light) {
+                let id = crate::geometry::ObjectId(i as u32);
+                lamps::warn_of_rounded_area(area, id, &geometry, shape, (file, &mut *diagnostics));
+            }
             info.push(ObjectInfo { material: shape.material, light, boundary: None });
         }
         enclosures::mark_boundaries(&mut info, &shapes, &materials, &geometry, !media.is_empty());

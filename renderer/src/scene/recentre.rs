@@ -41,7 +41,8 @@ fn bounds(scene: &SceneDesc) -> Option<(DVec3, DVec3)> {
             ShapeKind::Disk | ShapeKind::Rectangle => (DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, 1.0, 0.0)),
             ShapeKind::Sphere | ShapeKind::Cube => (-DVec3::ONE, DVec3::ONE),
         };
-        let corner = |i: u32| DVec3::from_array(std::array::from_fn(|k| if i >> k & 1 == 0 { low[k] } else { high[k] }));
+        let corner =
+            |i: u32| DVec3::from_array(std::array::from_fn(|k| if i >> k & 1 == 0 { low[k] } else { high[k] }));
         points.extend((0..8).map(|i| shape.to_world.transform_point3(corner(i))));
     }
     around(points.into_iter())

@@ -22,9 +22,15 @@ fn view() -> CameraDesc {
 
 /// A grey floor and what shines on it.
 fn floor(lamps: Vec<ShapeDesc>, lights: Vec<LightDesc>) -> SceneDesc {
-    let mut shapes = vec![shape(ShapeKind::Rectangle, facing(DVec3::ZERO, DVec3::Y, DVec3::splat(2.0)), 0)];
+    let mut shapes = vec![shape(ShapeKind::Rectangle, facing(DVec3::ZERO, DVec3::Y, DVec3::splat(4.0)), 0)];
     shapes.extend(lamps);
-    SceneDesc { shapes, lights, materials: vec![diffuse(ALBEDO as f32), diffuse(0.0)], camera: view(), ..SceneDesc::default() }
+    SceneDesc {
+        shapes,
+        lights,
+        materials: vec![diffuse(ALBEDO as f32), diffuse(0.0)],
+        camera: view(),
+        ..SceneDesc::default()
+    }
 }
 
 /// Mean radiance of the picture when the floor at `p` has this irradiance.
@@ -79,8 +85,15 @@ pub fn tiny(probe: &mut Probe) {
     }
     // Corners this near each other are known to the steps of coordinates only: near the axis these are small enough.
     let square = |p: DVec3| f64::from(radiance) * 4.0 * radius * radius / (p - DVec3::Y).length().powi(4);
-    let scene = floor(vec![lamp(ShapeKind::Rectangle, facing(DVec3::Y, -DVec3::Y, DVec3::splat(radius)), 1, radiance)], Vec::new());
+    let scene = floor(
+        vec![lamp(ShapeKind::Rectangle, facing(DVec3::Y, -DVec3::Y, DVec3::splat(radius)), 1, radiance)],
+        Vec::new(),
+    );
     known(probe, "square of 1e-12 sr", scene, &kinds, mean(square));
+    // Elsewhere rounding changes its area, which is warned of.
+    let m = facing(DVec3::new(0.3, 0.9, -0.2), -DVec3::Y, DVec3::splat(radius));
+    let scene = floor(vec![lamp(ShapeKind::Rectangle, m, 1, radiance)], Vec::new());
+    probe.build_warned("a square of 1e-12 sr off the axes", scene, "single precision");
     let point = LightDesc::Point { position: DVec3::Y, intensity: Rgb::ONE };
     known(probe, "point", floor(Vec::new(), vec![point]), &kinds, mean(|p| 1.0 / (p - DVec3::Y).length().powi(3)));
 }
@@ -141,7 +154,8 @@ pub fn radiance(probe: &mut Probe) {
             Some(dimmed(image, f64::from(factor as f32)))
         };
         let Some(plain) = picture(probe, 1.0, 32) else { continue };
-        for power in [-66, 66] {
+        // Chains aim at relative errors, with a floor that ordinary pictures do not come near: theirs are other samples.
+        for power in [-66, 66].into_iter().filter(|_| kind != Mmlt) {
             let factor = f64::powi(2.0, power);
             if let Some(image) = picture(probe, factor, 32) {
                 probe.same_bits(&format!("radiance times 2^{power}, {}", kind.name()), &image, &plain);
@@ -161,13 +175,15 @@ pub fn many(probe: &mut Probe) {
     const SIDE: u32 = 316;
     let half = 1.0 / f64::from(SIDE);
     let tile = |i: u32| {
-        let centre = DVec3::new(f64::from(2 * (i % SIDE) + 1) * half - 1.0, 1.0, f64::from(2 * (i / SIDE) + 1) * half - 1.0);
+        let centre =
+            DVec3::new(f64::from(2 * (i % SIDE) + 1) * half - 1.0, 1.0, f64::from(2 * (i / SIDE) + 1) * half - 1.0);
         lamp(ShapeKind::Rectangle, facing(centre, -DVec3::Y, DVec3::splat(half)), 1, 1.0)
     };
     let tiles = floor((0..SIDE * SIDE).map(tile).collect(), Vec::new());
     let one = floor(vec![lamp(ShapeKind::Rectangle, facing(DVec3::Y, -DVec3::Y, DVec3::ONE), 1, 1.0)], Vec::new());
     let count = probe.pick(256, 2048);
-    let reference = probe.build("one lamp", one).and_then(|s| probe.shoot("one lamp", &s, &shot(Path, 4 * count, -1, 34)));
+    let reference =
+        probe.build("one lamp", one).and_then(|s| probe.shoot("one lamp", &s, &shot(Path, 4 * count, -1, 34)));
     let scene = probe.build("99856 lamps", tiles);
     for kind in [Path, Light, Bdpt, Mmlt] {
         let Some(scene) = &scene else { break };
@@ -179,7 +195,8 @@ pub fn many(probe: &mut Probe) {
     // Points of very different strengths, in one place.
     let strength = |i: u32| f32::powi(10.0, i as i32 % 7 - 6);
     let total: f64 = (0..100_000).map(|i| f64::from(strength(i))).sum();
-    let points = (0..100_000).map(|i| LightDesc::Point { position: DVec3::Y, intensity: Rgb::splat(strength(i)) }).collect();
+    let points =
+        (0..100_000).map(|i| LightDesc::Point { position: DVec3::Y, intensity: Rgb::splat(strength(i)) }).collect();
     let truth = mean(|p| total / (p - DVec3::Y).length().powi(3));
     known(probe, "1e5 points", floor(Vec::new(), points), &[Path, Bdpt, Mmlt], truth);
 }

@@ -54,7 +54,9 @@ fn absorption(probe: &mut Probe) {
         let what = format!("slab of thickness {tau:e}");
         let Some(scene) = probe.build(&what, desc) else { continue };
         for kind in [Path, Bdpt, Mmlt] {
-            let Some(image) = probe.shoot(&what, &scene, &Shot { size: (8, 8), ..Shot::new(kind, 32, 6, 51) }) else { continue };
+            let Some(image) = probe.shoot(&what, &scene, &Shot { size: (8, 8), ..Shot::new(kind, 32, 6, 51) }) else {
+                continue;
+            };
             let truth = (-f64::from(tau)).exp();
             // The optical depth is rounded to f32, and the exponential carries that on.
             let allowed = 1e-6 * truth * f64::from(tau.max(1.0));
@@ -91,10 +93,15 @@ fn between_integrators(probe: &mut Probe, thicknesses: &[f32], asymmetries: &[f3
             desc.shapes.push(lamp(ShapeKind::Rectangle, facing(DVec3::Y * 3.0, -DVec3::Y, DVec3::splat(2.0)), 1, 3.0));
             desc.camera = camera(DVec3::new(0.0, 1.0, 5.0), DVec3::ZERO, 35.0);
             let what = format!("ball of thickness {tau:e}, g {g}");
-            let Some(scene) = probe.build(&what, desc) else { continue };
-            let shot = |kind, seed| Shot { size: (12, 12), ..Shot::new(kind, count, 8, seed) };
+            // Of free flights shorter than what coordinates can tell there must be a warning.
+            let scene =
+                if *tau >= 1e6 { probe.build_warned(&what, desc, "so dense") } else { probe.build(&what, desc) };
+            let Some(scene) = scene else { continue };
+            let more = |kind| if kind == Light { 4 * count } else { count };
+            let shot = |kind, seed| Shot { size: (12, 12), ..Shot::new(kind, more(kind), 8, seed) };
             let Some(reference) = probe.shoot(&what, &scene, &shot(Path, 53)) else { continue };
-            for kind in [Light, Bdpt, Mmlt] {
+            // Light tracing alone joins scattering to the lens, which a narrow peak makes a matter of luck.
+            for kind in [Light, Bdpt, Mmlt].into_iter().filter(|k| *k != Light || g.abs() < 0.99) {
                 if let Some(image) = probe.shoot(&what, &scene, &shot(kind, 54)) {
                     probe.agree(&format!("{what}, {}", kind.name()), &image, &reference, 0.2);
                 }

@@ -78,7 +78,9 @@ fn own_triangles(probe: &mut Probe, count: u64) {
     let mut s = IndependentSampler::new([1]);
     let (mut again, mut tried) = (0u64, 0u64);
     for _ in 0..count {
-        let Some(world) = World::mesh(probe, triangles(&[[point(&mut s), point(&mut s), point(&mut s)]])) else { return };
+        let Some(world) = World::mesh(probe, triangles(&[[point(&mut s), point(&mut s), point(&mut s)]])) else {
+            return;
+        };
         for _ in 0..20 {
             let from = world.anchor(0, 0, s.next_2d());
             let ray = from.ray(warp::uniform_sphere(s.next_2d()));
@@ -96,7 +98,8 @@ fn curved(probe: &mut Probe, count: u64) {
     for _ in 0..count / 3 {
         let radius = f64::from(10f32.powf(number(&mut s, -6.0, 6.0)));
         // Up to where coordinates still resolve the sphere.
-        let centre = warp::uniform_sphere(s.next_2d()).as_dvec3() * radius * f64::from(10f32.powf(number(&mut s, -3.0, 4.0)));
+        let centre =
+            warp::uniform_sphere(s.next_2d()).as_dvec3() * radius * f64::from(10f32.powf(number(&mut s, -3.0, 4.0)));
         let m = DAffine3::from_translation(centre) * DAffine3::from_scale(DVec3::splat(radius));
         for (k, shape) in [Shape::Sphere, Shape::Disk].into_iter().enumerate() {
             let Some(world) = World::new(probe, Vec::new(), vec![(shape, m)]) else { return };
@@ -125,12 +128,18 @@ fn instances(probe: &mut Probe, count: u64) {
     let mut s = IndependentSampler::new([3]);
     let (mut again, mut tried) = (0u64, 0u64);
     for _ in 0..count / 3 {
-        let triangle = [0, 1, 2].map(|_| Vec3::new(number(&mut s, -1.0, 1.0), number(&mut s, -1.0, 1.0), number(&mut s, -1.0, 1.0)));
-        let turn = DQuat::from_axis_angle(warp::uniform_sphere(s.next_2d()).as_dvec3().normalize(), f64::from(6.0 * s.next_1d()));
+        let triangle = [0, 1, 2]
+            .map(|_| Vec3::new(number(&mut s, -1.0, 1.0), number(&mut s, -1.0, 1.0), number(&mut s, -1.0, 1.0)));
+        let turn = DQuat::from_axis_angle(
+            warp::uniform_sphere(s.next_2d()).as_dvec3().normalize(),
+            f64::from(6.0 * s.next_1d()),
+        );
         let scale = DVec3::from_array([0, 1, 2].map(|_| f64::from(10f32.powf(number(&mut s, -3.0, 3.0)))));
         let place = point(&mut s).as_dvec3() * 1e-2;
         let m = DAffine3::from_scale_rotation_translation(scale, turn, place);
-        let Some(world) = World::new(probe, vec![triangles(&[triangle])], vec![(Shape::Mesh(MeshId(0)), m)]) else { return };
+        let Some(world) = World::new(probe, vec![triangles(&[triangle])], vec![(Shape::Mesh(MeshId(0)), m)]) else {
+            return;
+        };
         for _ in 0..20 {
             let from = world.anchor(0, 0, s.next_2d());
             let ray = from.ray(warp::uniform_sphere(s.next_2d()));
@@ -216,7 +225,9 @@ pub fn directions(probe: &mut Probe) {
                         hits.push(world.accel.intersect(&Ray { o, d, t_max: f32::INFINITY }));
                     }
                     let expected = (sign * size - o[axis]) * sign;
-                    probe.holds(hits.iter().all(|h| *h == hits[0]), || format!("zeros of another sign, another hit: {hits:?}"));
+                    probe.holds(hits.iter().all(|h| *h == hits[0]), || {
+                        format!("zeros of another sign, another hit: {hits:?}")
+                    });
                     let near = hits[0].is_some_and(|h| (h.t - expected).abs() <= 4.0 * f32::EPSILON * size);
                     probe.holds(near, || format!("along axis {axis} from {o}: {:?}, expected {expected}", hits[0]));
                 }
@@ -230,7 +241,9 @@ pub fn directions(probe: &mut Probe) {
             }
             let face = Vec3::new(size, o.y, o.z);
             let hit = world.accel.intersect(&Ray::new(face, Vec3::Y));
-            probe.holds(hit.is_none_or(|h| h.t.is_finite() && h.b.iter().all(|b| b.is_finite())), || format!("in a face: {hit:?}"));
+            probe.holds(hit.is_none_or(|h| h.t.is_finite() && h.b.iter().all(|b| b.is_finite())), || {
+                format!("in a face: {hit:?}")
+            });
         }
     }
     reversed(probe);
@@ -255,7 +268,9 @@ fn reversed(probe: &mut Probe) {
             let far = back.is_some_and(|b| b.t > 0.3 * size);
             lost += usize::from(!far);
         }
-        probe.holds(lost == 0, || format!("{lost} rays inside a ball of radius {size:e} are lost or stop where they start"));
+        probe.holds(lost == 0, || {
+            format!("{lost} rays inside a ball of radius {size:e} are lost or stop where they start")
+        });
     }
 }
 
@@ -291,7 +306,9 @@ pub fn watertight(probe: &mut Probe) {
                 let ray = Ray::new(o, to - o);
                 leaks += u32::from(world.accel.intersect(&ray).is_none() || !world.accel.occluded(&ray));
             }
-            probe.holds(leaks == 0, || format!("size {size:e}, {offset} sizes away, placed {placed}: {leaks} of {count} rays leak"));
+            probe.holds(leaks == 0, || {
+                format!("size {size:e}, {offset} sizes away, placed {placed}: {leaks} of {count} rays leak")
+            });
         }
     }
 }

@@ -69,8 +69,8 @@ pub fn roughness(probe: &mut Probe) {
                 }
             }
         }
-        // From a lobe a tenth wide on they come nearer and nearer, up to noise.
-        let near = distances.get(2..).is_some_and(|d| d.windows(2).all(|w| w[1] <= w[0] + 2e-3));
+        // They come nearer and nearer, down to the noise of so few samples; there the tests above tell.
+        let near = distances.windows(2).all(|w| w[1] <= w[0] || w[1] < 0.02);
         probe.holds(near, || format!("{name}: not ever nearer to smooth: {distances:?}"));
     }
 }
@@ -90,7 +90,7 @@ fn difference(a: &MergedImage, b: &MergedImage) -> f64 {
 fn grazing() -> Vec<Vec3> {
     let mut all = vec![Vec3::Z, -Vec3::Z];
     for cos in [1.0f32, 0.5, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-20, f32::MIN_POSITIVE, 0.0] {
-        for phi in [0.0f32, 0.7, 2.0, 3.141_592_7, 4.0] {
+        for phi in [0.0f32, 0.7, 2.0, std::f32::consts::PI, 4.0] {
             let (sin, c) = sin_cos(phi);
             let r = (1.0 - cos * cos).max(0.0).sqrt();
             all.extend([cos, -cos].map(|z| Vec3::new(r * c, r * sin, z).normalize()));
@@ -114,7 +114,8 @@ pub fn cosines(probe: &mut Probe) {
                         format!("{}: wo {wo}, wi {wi}: f {f:?}, pdf {pdf}", example.name)
                     });
                 }
-                let edges = [0.0, 1e-7, 0.5, ONE_MINUS_EPSILON].map(|x| Vec2::new(x, 1.0 - x).min(Vec2::splat(ONE_MINUS_EPSILON)));
+                let edges = [0.0, 1e-7, 0.5, ONE_MINUS_EPSILON]
+                    .map(|x| Vec2::new(x, 1.0 - x).min(Vec2::splat(ONE_MINUS_EPSILON)));
                 let drawn: Vec<Vec2> = (0..probe.pick(20, 1000)).map(|_| s.next_2d()).collect();
                 for u in edges.into_iter().chain(drawn) {
                     let Some(d) = example.bsdf.sample(wo, s.next_1d(), u, mode) else { continue };
@@ -176,7 +177,7 @@ fn phases(probe: &mut Probe) {
 }
 
 fn boundaries(probe: &mut Probe) {
-    let (mut reflectance, mut through) = (Worst::default(), Worst::default());
+    let mut reflectance = Worst::default();
     for eta in [1.0 / 2.4f32, 1.0 / 1.5, 0.99, 1.001, 1.33, 1.5, 2.4] {
         for k in 0..=probe.pick(400, 20_000) {
             let e = f64::from(k) / f64::from(probe.pick(400, 20_000));
@@ -184,20 +185,14 @@ fn boundaries(probe: &mut Probe) {
             let b = fresnel::dielectric(cos, eta);
             let (r, cos_t) = oracle::dielectric(f64::from(cos), f64::from(eta));
             // Near total reflection the cosine beyond is the root of a difference; away from it all digits count.
-            if cos_t.is_some_and(|c| c > 0.05) {
-                let place = || format!("cos {cos:e}, index {eta}");
-                if r > 1e-3 {
-                    reflectance.see(b.reflectance, r, place);
-                }
-                through.see(1.0 - b.reflectance, 1.0 - r, || format!("cos {cos:e}, index {eta}"));
+            if cos_t.is_some_and(|c| c > 0.05) && r > 1e-3 {
+                reflectance.see(b.reflectance, r, || format!("cos {cos:e}, index {eta}"));
             }
             let valid = (0.0..=1.0).contains(&b.reflectance) && (0.0..=1.0).contains(&b.cos_t);
             probe.holds(valid, || format!("cos {cos}, index {eta}: {b:?}"));
         }
     }
     reflectance.judge(probe, "Fresnel reflectance", 1e-4);
-    // At grazing angles hardly anything passes: what is left of 1 is absolute.
-    probe.figure(format!("1 - reflectance {:.0e}", through.error));
 }
 
 fn facets(probe: &mut Probe) {
@@ -207,12 +202,17 @@ fn facets(probe: &mut Probe) {
         let model = Microfacet::new(Distribution::Ggx, alpha[0], alpha[1]);
         let own = Facets { ggx: true, alpha: alpha.map(f64::from) };
         let metal = Bsdf::Conductor(Conductor { eta: Rgb::ZERO, k: Rgb::ONE, reflectance: Rgb::ONE, facets: model });
-        let glass = Bsdf::Dielectric(Dielectric { eta: 1.5, reflectance: Rgb::ONE, transmittance: Rgb::ONE, facets: model });
+        let glass =
+            Bsdf::Dielectric(Dielectric { eta: 1.5, reflectance: Rgb::ONE, transmittance: Rgb::ONE, facets: model });
         let mut s = IndependentSampler::new([23]);
         for &wo in &directions {
             let mut others = directions.clone();
-            others.extend((0..20).filter_map(|_| Some(metal.sample(wo, s.next_1d(), s.next_2d(), Transport::Radiance)?.wi)));
-            others.extend((0..20).filter_map(|_| Some(glass.sample(wo, s.next_1d(), s.next_2d(), Transport::Radiance)?.wi)));
+            others.extend(
+                (0..20).filter_map(|_| Some(metal.sample(wo, s.next_1d(), s.next_2d(), Transport::Radiance)?.wi)),
+            );
+            others.extend(
+                (0..20).filter_map(|_| Some(glass.sample(wo, s.next_1d(), s.next_2d(), Transport::Radiance)?.wi)),
+            );
             for wi in others {
                 let place = || format!("alpha {alpha:?}, wo {wo}, wi {wi}");
                 if wo.z > 0.0 && wi.z > 0.0 {

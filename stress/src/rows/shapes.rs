@@ -12,13 +12,14 @@ use std::time::Instant;
 
 const ALL: [IntegratorKind; 4] = [Path, Light, Bdpt, Mmlt];
 
-/// Adds triangles without area: of one point, of two, of three in a line, and one whose area is lost to underflow.
-fn spoil(mesh: &mut Mesh) {
+/// Adds triangles without area: of one point, of two, one whose area is lost to underflow; and of three points in a line, which stay
+/// in one only where nothing turns them.
+fn spoil(mesh: &mut Mesh, lines: bool) {
     let first = mesh.positions.len() as u32;
     let p = mesh.positions[mesh.triangles[0][0] as usize];
     mesh.positions.extend([p, p + Vec3::X, p + Vec3::X * 2.0, p + Vec3::X * 1e-25, p + Vec3::Y * 1e-25]);
-    mesh.uvs.resize(mesh.positions.len(), Default::default());
-    mesh.triangles.extend([[0, 0, 0], [0, 1, 1], [0, 1, 2], [2, 0, 1], [0, 3, 4]].map(|t: [u32; 3]| t.map(|i| first + i)));
+    let all = [[0, 0, 0], [0, 1, 1], [0, 3, 4], [0, 1, 2], [2, 0, 1]].map(|t: [u32; 3]| t.map(|i| first + i));
+    mesh.triangles.extend(&all[..if lines { 5 } else { 3 }]);
 }
 
 /// A square in the plane y = 0 as a mesh, its face upward.
@@ -72,10 +73,11 @@ fn stage(floor: Mesh, lamp_mesh: Mesh) -> SceneDesc {
 
 /// Triangles without area change nothing; needles make the same surface.
 pub fn triangles(probe: &mut Probe) {
-    let count = probe.pick(64, 512);
+    let count = probe.pick(48, 512);
     let plain = stage(square(1.5), square(0.5));
     let mut spoiled = plain.clone();
-    spoiled.meshes.iter_mut().for_each(spoil);
+    spoil(&mut spoiled.meshes[0], true);
+    spoil(&mut spoiled.meshes[1], false);
     let (a, b) = (probe.build("plain", plain), probe.build("with triangles without area", spoiled));
     let (Some(plain), Some(spoiled)) = (a, b) else { return };
     let mut reference = None;
@@ -88,11 +90,10 @@ pub fn triangles(probe: &mut Probe) {
         }
     }
     let Some(reference) = reference else { return };
-    let many = probe.pick(20_000, 400_000);
-    for (what, floor, lamp_mesh) in [
-        ("strips", strips(1.5, many), strips(0.5, 1000)),
-        ("fan", fan(1.5, many), fan(0.5, 1000)),
-    ] {
+    let many = probe.pick(3000, 400_000);
+    for (what, floor, lamp_mesh) in
+        [("strips", strips(1.5, many), strips(0.5, 300)), ("fan", fan(1.5, many), fan(0.5, 300))]
+    {
         let what = format!("{what} of {many}");
         let Some(scene) = probe.build(&what, stage(floor, lamp_mesh)) else { continue };
         for kind in ALL {
@@ -126,7 +127,9 @@ pub fn coincident(probe: &mut Probe) {
         desc
     };
     let Some(reference) = probe.build("a lamp 1e-3 below", hung(1e-3)) else { return };
-    let Some(reference) = probe.shoot("a lamp 1e-3 below", &reference, &Shot::new(Path, 4 * count, 6, 64)) else { return };
+    let Some(reference) = probe.shoot("a lamp 1e-3 below", &reference, &Shot::new(Path, 4 * count, 6, 64)) else {
+        return;
+    };
     for gap in [1e-5, 1e-6] {
         let what = format!("a lamp {gap:e} below the ceiling");
         let Some(scene) = probe.build(&what, hung(gap)) else { continue };
@@ -138,10 +141,7 @@ pub fn coincident(probe: &mut Probe) {
         }
     }
     // In the same plane there is no telling which is in front; who writes that is told so.
-    let mut warned = renderer::diagnostics::Diagnostics::default();
-    let built = renderer::scene::Scene::build(hung(0.0), "stress", &mut warned);
-    let told = warned.list.iter().any(|d| d.message.contains("same place"));
-    probe.holds(built.is_some() && told, || format!("a lamp in the plane of the ceiling is not warned of: {:?}", warned.list));
+    probe.build_warned("a lamp in the plane of the ceiling", hung(0.0), "same place");
 }
 
 /// A million placements of one mesh.

@@ -102,10 +102,7 @@ fn sums_of_a_group(probe: &mut Probe) {
 
 /// As many samples per pixel as a job may have, through the merger.
 fn a_whole_job(probe: &mut Probe) {
-    let options = RenderOptions {
-        size: Some((1, 1)),
-        ..RenderOptions::counting(IntegratorKind::Path, 1 << 24)
-    };
+    let options = RenderOptions { size: Some((1, 1)), ..RenderOptions::counting(IntegratorKind::Path, 1 << 24) };
     let Ok(mut settings) = RenderSettings::resolve(&options, &RenderDefaults::default()) else {
         probe.holds(false, || "the settings are refused".into());
         return;
@@ -139,7 +136,9 @@ fn a_whole_job(probe: &mut Probe) {
     let off = relative(f64::from(image.mean[0][0]), f64::from(value));
     probe.holds(off <= 1e-7, || format!("the mean of 2^24 samples is off by {off:.1e}"));
     let a = image.aovs[0];
-    for (what, found, truth) in [("depth", a.depth, depth), ("albedo", a.albedo[0], 0.3), ("normal", a.normal[2], 0.8), ("hits", a.hits, 1.0)] {
+    for (what, found, truth) in
+        [("depth", a.depth, depth), ("albedo", a.albedo[0], 0.3), ("normal", a.normal[2], 0.8), ("hits", a.hits, 1.0)]
+    {
         // A unit sums 256 of them in single precision.
         let off = relative(f64::from(found), f64::from(truth));
         probe.holds(off <= 1e-5, || format!("the mean {what} of 2^24 samples is off by {off:.1e}"));
@@ -170,7 +169,9 @@ pub fn sobol(probe: &mut Probe) {
                         twice += u32::from(std::mem::replace(&mut seen[cell as usize], true));
                     }
                     probe.holds(twice == 0, || {
-                        format!("2^{m} points from index {first}, pair {pair}: {twice} share a cell of {columns} x {rows}")
+                        format!(
+                            "2^{m} points from index {first}, pair {pair}: {twice} share a cell of {columns} x {rows}"
+                        )
                     });
                 }
             }

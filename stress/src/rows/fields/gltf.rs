@@ -79,14 +79,16 @@ pub(super) fn fields(probe: &mut Probe) {
     let name = "scene.gltf";
     let sound = file(&DATA);
     let numbers = text::outside_of_strings(&sound, None);
-    let document = Document { name, text: &sound, numbers, bad: &["NaN", "Infinity", "1e39", "-1e39", "1e400", "-1e400"] };
+    let document =
+        Document { name, text: &sound, numbers, bad: &["NaN", "Infinity", "1e39", "-1e39", "1e400", "-1e400"] };
     replaced(probe, &document, false);
     for i in 0..DATA.len() {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let mut data = DATA;
             data[i] = bad;
             let files = vec![(name, file(&data).into_bytes())];
-            refused(probe, name, &format!("{bad} for number {i} of the buffer"), Some("accessors[".into()), files);
+            let place = if i < 24 { "meshes[0].primitives[0]" } else { "nodes[2]" };
+            refused(probe, name, &format!("{bad} for number {i} of the buffer"), Some(place.into()), files);
         }
     }
 }
