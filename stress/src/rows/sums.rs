@@ -78,6 +78,11 @@ pub fn drift(probe: &mut Probe) {
     a_whole_job(probe);
 }
 
+/// Samples that all count for their own pixel, once.
+fn tile(rect: Rect, samples: u32, sums: Vec<Rgb>, aovs: Vec<Aov>) -> TileSums {
+    TileSums { rect, covered: rect, samples, weights: vec![samples as f32; rect.area()], sums, aovs }
+}
+
 /// 1e9 samples of a pixel.
 fn sums_of_a_group(probe: &mut Probe) {
     const PER_UNIT: u32 = 1000;
@@ -90,7 +95,7 @@ fn sums_of_a_group(probe: &mut Probe) {
         let sum = (0.1 + 0.01 * f64::from(s.next_1d())) * f64::from(PER_UNIT);
         let sums = vec![Rgb::splat(sum as f32)];
         exact.add(sum as f32);
-        group.add_tile(1, 1, &TileSums { rect, samples: PER_UNIT, sums, aovs: Vec::new() });
+        group.add_tile(1, 1, &tile(rect, PER_UNIT, sums, Vec::new()));
     }
     let (mean, n) = group.pixel(0);
     let truth = exact.value() / f64::from(units) / f64::from(PER_UNIT);
@@ -120,7 +125,7 @@ fn a_whole_job(probe: &mut Probe) {
                 aov.add(&Aov { albedo: [0.3; 3], normal: [0.0, 0.6, 0.8], depth, hits: 1.0 });
             }
             let sums = vec![Rgb::splat((f64::from(value) * f64::from(n)) as f32); rect.area()];
-            let tile = Some(TileSums { rect, samples: n, sums, aovs: vec![aov; rect.area()] });
+            let tile = Some(tile(rect, n, sums, vec![aov; rect.area()]));
             let result = UnitResult { tile, counters: Counters::default(), ..UnitResult::default() };
             if !probe.holds(merger.fold(id, &result).is_ok(), || format!("unit {id} is not folded")) {
                 return;
