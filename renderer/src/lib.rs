@@ -22,4 +22,4 @@ pub mod spectrum;
 pub mod texture;
 
 /// Fingerprint of everything that decides a unit's bits: workers and coordinators refuse each other when it differs.
-pub const FINGERPRINT: &str = concat!("lightfarm-", env!("CARGO_PKG_VERSION"), "-units-2");
+pub const FINGERPRINT: &str = concat!("lightfarm-", env!("CARGO_PKG_VERSION"), "-units-3");

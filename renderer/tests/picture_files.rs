@@ -1,7 +1,7 @@
 //! EXR and PNG files: what is written is read back, the same image gives the same bytes, and damaged files are refused.
 
 use renderer::film::exr::{self, Provenance};
-use renderer::film::{Aov, Counters, ERROR_BLOCK, GroupFilm, MergedImage, Rect, TileSums};
+use renderer::film::{Aov, AovSum, Counters, ERROR_BLOCK, GroupFilm, MergedImage, Rect, TileSums};
 use renderer::scene::bundle::Digest;
 use renderer::spectrum::Rgb;
 use std::path::Path;
@@ -22,7 +22,7 @@ impl Noise {
     }
 }
 
-fn groups(count: u32) -> (Vec<GroupFilm>, Vec<Aov>) {
+fn groups(count: u32) -> (Vec<GroupFilm>, Vec<AovSum>) {
     let rect = Rect { x0: 0, y0: 0, x1: WIDTH, y1: HEIGHT };
     let mut noise = Noise(1);
     let mut films = Vec::new();
@@ -38,13 +38,13 @@ fn groups(count: u32) -> (Vec<GroupFilm>, Vec<Aov>) {
     }
     let aov =
         |i: usize| Aov { albedo: [1.0, 0.5, i as f32], normal: [0.0, 2.0, 0.0], depth: 6.0, hits: (i % 3) as f32 };
-    (films, (0..rect.area()).map(aov).collect())
+    (films, (0..rect.area()).map(|i| AovSum::from_iter([aov(i)])).collect())
 }
 
 fn image(count: u32) -> MergedImage {
     let (films, aovs) = groups(count);
     let counters = Counters { samples: 7, rays: 1 << 40, non_finite: 0, negative: 1 };
-    MergedImage::from_groups(WIDTH, HEIGHT, &films, aovs, counters)
+    MergedImage::from_groups(WIDTH, HEIGHT, &films, &aovs, counters)
 }
 
 fn provenance() -> Provenance {
@@ -91,7 +91,7 @@ fn an_image_of_one_group_has_no_error_layers() {
 #[test]
 fn block_errors_are_those_of_the_groups_block_means() {
     let (films, aovs) = groups(5);
-    let image = MergedImage::from_groups(WIDTH, HEIGHT, &films, aovs, Counters::default());
+    let image = MergedImage::from_groups(WIDTH, HEIGHT, &films, &aovs, Counters::default());
     // The block at the lower right corner: 5 x 5 pixels.
     let inside = |i: &usize| *i as u32 % WIDTH >= 32 && *i as u32 / WIDTH >= 16;
     let pixels: Vec<usize> = (0..(WIDTH * HEIGHT) as usize).filter(inside).collect();

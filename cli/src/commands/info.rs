@@ -4,7 +4,7 @@ use crate::exit::{Failure, Outcome};
 use crate::output::Console;
 use crate::scene_file;
 use renderer::job::{RenderOptions, RenderSettings};
-use renderer::scene::desc::{CameraDesc, Medium, Phase};
+use renderer::scene::desc::{Medium, Phase};
 use renderer::scene::{Scene, SceneFeatures, bundle::Digest};
 use renderer::texture::Texture;
 use serde::Serialize;
@@ -86,7 +86,7 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         fills_scene: scene.global_medium.map(|id| medium_kind(&scene.media[id.0 as usize])),
         textures: count(scene.textures.iter().map(texture_kind)),
         texels: texels(scene),
-        camera: camera(&scene.camera),
+        camera: camera(scene),
         memory: Memory { resident_bytes, film_bytes: film_bytes(&settings) },
         settings,
     };
@@ -124,9 +124,10 @@ fn texels(scene: &Scene) -> u64 {
     images.collect::<BTreeMap<_, _>>().values().sum()
 }
 
-fn camera(c: &CameraDesc) -> Camera {
+fn camera(scene: &Scene) -> Camera {
+    let c = &scene.camera;
     Camera {
-        position: c.to_world.translation.to_array(),
+        position: (c.to_world.translation + scene.origin).to_array(),
         direction: (-c.to_world.matrix3.z_axis).normalize_or_zero().to_array(),
         fov_degrees: c.fov,
         fov_axis: format!("{:?}", c.fov_axis).to_lowercase(),
@@ -138,7 +139,7 @@ fn camera(c: &CameraDesc) -> Camera {
 /// Sums of one group (two for a splatting job), the means of all groups, first hits, and the merged image.
 fn film_bytes(s: &RenderSettings) -> u64 {
     let pixels = u64::from(s.width) * u64::from(s.height);
-    pixels * (2 * 28 + 12 * u64::from(s.replicates) + 32 + 60)
+    pixels * (2 * 28 + 12 * u64::from(s.replicates) + 64 + 60)
 }
 
 /// Bytes that the process holds in memory.

@@ -10,6 +10,7 @@ mod pause;
 mod render;
 mod resume;
 mod show;
+mod stress;
 mod submit;
 mod watch;
 mod worker;
@@ -51,6 +52,9 @@ pub enum Command {
     Cancel(JobArgs),
     /// List a farm's workers
     Workers(workers::Args),
+    /// Test this build on scenes and numbers at the ends of their ranges
+    #[command(hide = true)]
+    Stress(stress::Args),
 }
 
 impl Command {
@@ -71,6 +75,7 @@ impl Command {
             Self::Resume(args) => resume::run(args, console),
             Self::Cancel(args) => cancel::run(args, console),
             Self::Workers(args) => workers::run(args, console),
+            Self::Stress(args) => stress::run(args, console),
         }
     }
 

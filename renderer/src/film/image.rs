@@ -1,5 +1,5 @@
 use super::blocks::{BlockErrors, BlockScatter};
-use super::{Aov, Counters, GroupFilm};
+use super::{Aov, AovSum, Counters, GroupFilm};
 use serde::{Deserialize, Serialize};
 
 /// The error of an image, told by its replicate groups.
@@ -48,11 +48,10 @@ impl MergedImage {
     /// `sum n_g (I_g - I)^2 / ((G - 1) sum n_g)`, which is unbiased for unequal `n_g` too.
     ///
     /// `aovs` are sums over the samples of group 0, or empty.
-    pub fn from_groups(width: u32, height: u32, groups: &[GroupFilm], mut aovs: Vec<Aov>, counters: Counters) -> Self {
+    pub fn from_groups(width: u32, height: u32, groups: &[GroupFilm], aovs: &[AovSum], counters: Counters) -> Self {
         let pixels = width as usize * height as usize;
-        for (i, aov) in aovs.iter_mut().enumerate() {
-            aov.average(groups.first().map_or(0.0, |g| g.pixel(i).1));
-        }
+        let samples = |i: usize| groups.first().map_or(0.0, |g| g.pixel(i).1);
+        let aovs = aovs.iter().enumerate().map(|(i, sum)| sum.average(samples(i))).collect();
         let mut image = Self {
             width,
             height,

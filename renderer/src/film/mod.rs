@@ -15,4 +15,4 @@ pub use filter::{Filter, Footprint, MAX_FOOTPRINT};
 pub use group::GroupFilm;
 pub use image::{ErrorSummary, MergedImage};
 pub use splat::{BLOCK, SplatSums};
-pub use tile::{Aov, Rect, TileSums};
+pub use tile::{Aov, AovSum, Rect, TileSums};

@@ -69,7 +69,7 @@ pub struct Aov {
 }
 
 impl Aov {
-    /// Adds another sum.
+    /// Adds another sum: of a unit's samples, of which there are few.
     #[inline]
     pub fn add(&mut self, o: &Self) {
         for i in 0..3 {
@@ -79,14 +79,39 @@ impl Aov {
         self.depth += o.depth;
         self.hits += o.hits;
     }
+}
 
-    /// Turns sums over `samples` samples into averages: depth over the hits, all else over the samples.
-    pub fn average(&mut self, samples: f64) {
-        let scale = if samples > 0.0 { (1.0 / samples) as f32 } else { 0.0 };
-        self.albedo = self.albedo.map(|v| v * scale);
-        self.normal = self.normal.map(|v| v * scale);
-        self.depth = if self.hits > 0.0 { self.depth / self.hits } else { f32::INFINITY };
-        self.hits *= scale;
+/// Sums of the auxiliary values of a whole job: albedo, normal, depth, hits. In single precision they would stop growing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct AovSum([f64; 8]);
+
+impl AovSum {
+    /// Adds a unit's sum.
+    #[inline]
+    pub fn add(&mut self, o: &Aov) {
+        let values = [o.albedo[0], o.albedo[1], o.albedo[2], o.normal[0], o.normal[1], o.normal[2], o.depth, o.hits];
+        self.0.iter_mut().zip(values).for_each(|(to, v)| *to += f64::from(v));
+    }
+
+    /// Averages over `samples` samples: depth over the hits, all else over the samples.
+    pub fn average(&self, samples: f64) -> Aov {
+        let mean = |v: f64| if samples > 0.0 { (v / samples) as f32 } else { 0.0 };
+        let [r, g, b, x, y, z, depth, hits] = self.0;
+        Aov {
+            albedo: [r, g, b].map(mean),
+            normal: [x, y, z].map(mean),
+            depth: if hits > 0.0 { (depth / hits) as f32 } else { f32::INFINITY },
+            hits: mean(hits),
+        }
+    }
+}
+
+impl FromIterator<Aov> for AovSum {
+    fn from_iter<T: IntoIterator<Item = Aov>>(sums: T) -> Self {
+        let mut all = Self::default();
+        sums.into_iter().for_each(|aov| all.add(&aov));
+        all
     }
 }
 

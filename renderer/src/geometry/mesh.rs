@@ -27,11 +27,13 @@ pub enum MeshError {
         /// How many there are.
         count: usize,
     },
-    /// A coordinate is NaN or infinite.
-    #[error("vertex {vertex} has a coordinate that is not a finite number")]
+    /// A number is NaN or infinite.
+    #[error("vertex {vertex} has a {what} that is not a finite number")]
     NotFinite {
         /// The vertex.
         vertex: usize,
+        /// `coordinate`, `normal` or `texture coordinate`.
+        what: &'static str,
     },
     /// Attribute arrays of different lengths.
     #[error("{positions} positions, but {other} {what}")]
@@ -54,8 +56,12 @@ impl Mesh {
                 return Err(MeshError::Length { positions: count, what, other });
             }
         }
-        if let Some(vertex) = self.positions.iter().position(|p| !p.is_finite()) {
-            return Err(MeshError::NotFinite { vertex });
+        let bad = |list: &[Vec3]| list.iter().position(|p| !p.is_finite());
+        let bad_uv = self.uvs.iter().position(|uv| !uv.is_finite());
+        let found =
+            [(bad(&self.positions), "coordinate"), (bad(&self.normals), "normal"), (bad_uv, "texture coordinate")];
+        if let Some((Some(vertex), what)) = found.into_iter().find(|(at, _)| at.is_some()) {
+            return Err(MeshError::NotFinite { vertex, what });
         }
         for (triangle, corners) in self.triangles.iter().enumerate() {
             if let Some(&index) = corners.iter().find(|&&i| i as usize >= count) {

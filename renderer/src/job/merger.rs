@@ -122,7 +122,7 @@ impl Merger {
     /// The image so far.
     pub fn image(&self) -> MergedImage {
         let mut image = if self.tries() {
-            MergedImage::from_groups(self.settings.width, self.settings.height, &[], Vec::new(), Counters::default())
+            MergedImage::from_groups(self.settings.width, self.settings.height, &[], &[], Counters::default())
         } else {
             self.now.image()
         };

@@ -3,7 +3,7 @@ use super::metropolis::Metropolis;
 use super::plan::{CHECKPOINT_SAMPLES, Learned, Part, PassPlan, Planner, Sampling};
 use super::settings::RenderSettings;
 use super::unit::{UnitKind, UnitResult};
-use crate::film::{Aov, Counters, GroupFilm, MergedImage, SplatSums};
+use crate::film::{AovSum, Counters, GroupFilm, MergedImage, SplatSums};
 use crate::integrator::IntegratorKind;
 use crate::integrator::mmlt::ChainStats;
 use std::io::{self, Write};
@@ -39,7 +39,7 @@ pub struct Rendering {
     next: u32,
     done_spp: u32,
     groups: Vec<GroupFilm>,
-    aovs: Vec<Aov>,
+    aovs: Vec<AovSum>,
     light_sums: Vec<f64>,
     /// What a Metropolis job has learned.
     metropolis: Metropolis,
@@ -202,7 +202,7 @@ impl Rendering {
         }
         let width = self.settings.width as usize;
         if self.aovs.is_empty() {
-            self.aovs = vec![Aov::default(); width * self.settings.height as usize];
+            self.aovs = vec![AovSum::default(); width * self.settings.height as usize];
         }
         for ((x, y), aov) in tile.rect.pixels().zip(&tile.aovs) {
             self.aovs[y as usize * width + x as usize].add(aov);
@@ -306,7 +306,7 @@ impl Rendering {
         let (w, h) = (self.settings.width, self.settings.height);
         let preview = (self.done_spp == 0).then(|| self.metropolis.preview(w, h, &self.groups)).flatten();
         let groups = preview.as_ref().map_or(&self.groups[..], std::slice::from_ref);
-        MergedImage::from_groups(w, h, groups, self.aovs.clone(), self.counters())
+        MergedImage::from_groups(w, h, groups, &self.aovs, self.counters())
     }
 
     /// The replicate groups: independent pictures of the same, whose scatter tells the error.
@@ -370,8 +370,8 @@ impl Rendering {
         head.settings.validate().ok()?;
         let pixels = head.settings.width as usize * head.settings.height as usize;
         let aovs = r.length()?;
-        let aovs = r.take(aovs.checked_mul(size_of::<Aov>())?)?;
-        let aovs: Vec<Aov> = aovs.chunks_exact(size_of::<Aov>()).map(bytemuck::pod_read_unaligned).collect();
+        let aovs = r.take(aovs.checked_mul(size_of::<AovSum>())?)?;
+        let aovs: Vec<AovSum> = aovs.chunks_exact(size_of::<AovSum>()).map(bytemuck::pod_read_unaligned).collect();
         if !aovs.is_empty() && aovs.len() != pixels {
             return None;
         }

@@ -111,7 +111,8 @@ impl Edge {
     /// Between two points, with `w` the unit direction from the first to the second.
     #[inline]
     pub fn between(from: &Anchor, to: &Anchor, w: Vec3) -> Self {
-        let d2 = f64::from((to.p - from.p).length_squared());
+        // Points of a dense medium may fall together: far too near for coordinates is as good as any distance, but not 0 / 0.
+        let d2 = f64::from((to.p - from.p).length_squared()).max(f64::from(f32::MIN_POSITIVE));
         Self { forward: abs_cos(to, w) / d2, backward: abs_cos(from, w) / d2, passes: 1.0 }
     }
 

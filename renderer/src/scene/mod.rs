@@ -6,6 +6,8 @@ mod enclosures;
 mod features;
 mod flight;
 pub mod import;
+mod lamps;
+mod recentre;
 mod shapes;
 
 pub use enclosures::{Boundary, Enclosures};
@@ -17,7 +19,7 @@ use crate::bsdf::{Material, MaterialId, first_bad_nesting};
 use crate::diagnostics::{Diagnostics, SceneError};
 use crate::geometry::{BoundingSphere, Geometry, Interaction, Object};
 use crate::light::{Light, LightContext, LightSelector};
-use crate::math::Transform;
+use crate::math::{DVec3, Transform};
 use crate::medium::Medium;
 use crate::texture::Texture;
 use bundle::FileSource;
@@ -50,6 +52,8 @@ pub struct Scene {
     pub camera_enclosures: Enclosures,
     /// The camera.
     pub camera: desc::CameraDesc,
+    /// What was subtracted from all coordinates of a scene that is far from the origin.
+    pub origin: DVec3,
     /// What the scene file says of rendering.
     pub defaults: desc::RenderDefaults,
     /// What the scene contains, and so what is skipped.
@@ -81,7 +85,8 @@ impl Scene {
     }
 
     /// Builds the acceleration structure, lights and features of a description; `None` when `diagnostics` got an error.
-    pub fn build(desc: SceneDesc, file: &str, diagnostics: &mut Diagnostics) -> Option<Self> {
+    pub fn build(mut desc: SceneDesc, file: &str, diagnostics: &mut Diagnostics) -> Option<Self> {
+        let origin = recentre::recentre(&mut desc);
         let SceneDesc { meshes, shapes, textures, materials, media, global_medium, lights, camera, defaults } = desc;
         let light_descs = lights;
         check_references(&materials, &meshes, &shapes, file, diagnostics);
@@ -101,6 +106,11 @@ impl Scene {
             }
         }
         let mut geometry = Geometry { meshes: builder.meshes, objects };
+        let described: Vec<Option<f64>> = shapes
+            .iter()
+            .zip(&geometry.objects)
+            .map(|(shape, object)| lamps::described_area(shape, object, &geometry))
+            .collect();
         geometry.bake();
         let bounds = geometry.bounds();
         if let Err(e) = crate::camera::Camera::new(&camera, 16, 16) {
@@ -118,6 +128,10 @@ impl Scene {
                 lights.push(light);
                 lights.len() as u32 - 1
             });
+            if let (Some(area), Some(_)) = (described.get(i).copied().flatten(), light) {
+                let id = crate::geometry::ObjectId(i as u32);
+                lamps::warn_of_rounded_area(area, id, &geometry, shape, (file, &mut *diagnostics));
+            }
             info.push(ObjectInfo { material: shape.material, light, boundary: None });
         }
         enclosures::mark_boundaries(&mut info, &shapes, &materials, &geometry, !media.is_empty());
@@ -152,6 +166,7 @@ impl Scene {
             global_medium,
             camera_enclosures: Enclosures::default(),
             camera,
+            origin,
             defaults,
             features,
             bounds,
@@ -160,6 +175,7 @@ impl Scene {
         if scene.features.has_media() {
             scene.enclose(file, diagnostics);
         }
+        scene.warn_of_covered_lamps(&shapes, file, diagnostics);
         Some(scene)
     }
 

@@ -41,7 +41,7 @@ fn with_groups(seed: u64, scale: f32) -> Picture {
         film
     };
     let films: Vec<GroupFilm> = (0..8).map(|_| film()).collect();
-    let image = MergedImage::from_groups(SIDE, SIDE, &films, Vec::new(), Counters::default());
+    let image = MergedImage::from_groups(SIDE, SIDE, &films, &[], Counters::default());
     let about = Provenance { scene: Digest::of(b""), seed, settings: serde_json::Value::Null, choice: None };
     exr::decode(&exr::encode(&image, &about).unwrap()).unwrap()
 }

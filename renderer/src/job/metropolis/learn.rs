@@ -43,6 +43,9 @@ impl Metropolis {
             sums[cell] += (0..3).map(|c| (v[c] + d[c]) / 3.0).sum::<f64>();
             counts[cell] += 1.0;
         }
+        // Relative to a picture of no ordinary brightness: factors must be about one whatever the unit of light.
+        let mean = sums.iter().sum::<f64>() / counts.iter().sum::<f64>();
+        let unit = if mean > 0.0 { mean / mean.clamp(1e-3, 10.0) } else { 1.0 };
         // Cells share with their neighbours: the pilot is noisy.
         let at = |x: i64, y: i64| {
             let inside = x >= 0 && y >= 0 && x < i64::from(columns) && y < i64::from(rows);
@@ -53,7 +56,7 @@ impl Metropolis {
             let around =
                 (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))).filter_map(|(dx, dy)| at(x + dx, y + dy));
             let (sum, count) = around.fold((0.0, 0.0), |(s, n), i| (s + sums[i], n + counts[i]));
-            let mean = sum / count;
+            let mean = sum / count / unit;
             pow64(mean * mean + 0.01, -0.5 * f64::from(settings.mmlt.lift)) as f32
         });
         let target = target.collect();

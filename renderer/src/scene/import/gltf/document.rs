@@ -2,8 +2,10 @@
 
 use super::report::{Checked, Fault, Report};
 use gltf::json;
-use serde::Deserialize;
+use serde::de::{self, Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
+use std::borrow::Cow;
+use std::fmt;
 use std::sync::Arc;
 
 /// Extensions that are honoured, or that change nothing here.
@@ -42,6 +44,12 @@ pub(super) fn parse(bytes: &[u8]) -> Checked<Document> {
 
 /// JSON text to the crate's types.
 fn typed(text: &[u8], in_glb: bool) -> Checked<json::Root> {
+    let mut numbers = serde_json::Deserializer::from_slice(text);
+    if let Err(e) = serde_path_to_error::deserialize::<_, SinglePrecision>(&mut numbers)
+        && e.inner().is_data()
+    {
+        return Err(json_fault(e.inner(), &e.path().to_string(), in_glb));
+    }
     let mut source = serde_json::Deserializer::from_slice(text);
     let error = match serde_path_to_error::deserialize(&mut source) {
         Ok(root) => return source.end().map(|()| root).map_err(|e| json_fault(&e, "", in_glb)),
@@ -56,6 +64,67 @@ fn typed(text: &[u8], in_glb: bool) -> Checked<json::Root> {
     }
     let path = error.path().to_string();
     Err(json_fault(error.inner(), if path == "." { "" } else { &path }, in_glb))
+}
+
+/// JSON of which nothing is kept: all its numbers, but for those of applications (`extras`), must be finite in single precision, in
+/// which the crate reads them.
+struct SinglePrecision;
+
+impl<'de> Deserialize<'de> for SinglePrecision {
+    fn deserialize<D: Deserializer<'de>>(source: D) -> Result<Self, D::Error> {
+        source.deserialize_any(Numbers)
+    }
+}
+
+struct Numbers;
+
+impl<'de> Visitor<'de> for Numbers {
+    type Value = SinglePrecision;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("JSON")
+    }
+
+    fn visit_f64<E: de::Error>(self, v: f64) -> Result<SinglePrecision, E> {
+        let message = || E::custom(format_args!("{v:e} is beyond single precision; expected a finite number"));
+        (v as f32).is_finite().then_some(SinglePrecision).ok_or_else(message)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<SinglePrecision, A::Error> {
+        while list.next_element::<SinglePrecision>()?.is_some() {}
+        Ok(SinglePrecision)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<SinglePrecision, A::Error> {
+        while let Some(key) = map.next_key::<Cow<'de, str>>()? {
+            if key == "extras" {
+                map.next_value::<IgnoredAny>()?;
+            } else {
+                map.next_value::<SinglePrecision>()?;
+            }
+        }
+        Ok(SinglePrecision)
+    }
+
+    fn visit_bool<E>(self, _: bool) -> Result<SinglePrecision, E> {
+        Ok(SinglePrecision)
+    }
+
+    fn visit_i64<E>(self, _: i64) -> Result<SinglePrecision, E> {
+        Ok(SinglePrecision)
+    }
+
+    fn visit_u64<E>(self, _: u64) -> Result<SinglePrecision, E> {
+        Ok(SinglePrecision)
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<SinglePrecision, E> {
+        Ok(SinglePrecision)
+    }
+
+    fn visit_unit<E>(self) -> Result<SinglePrecision, E> {
+        Ok(SinglePrecision)
+    }
 }
 
 fn json_fault(e: &serde_json::Error, path: &str, in_glb: bool) -> Fault {

@@ -32,7 +32,7 @@ const KINDS: [(&str, Kind); 7] = [
     ("null", Kind::Null),
 ];
 /// Smallest and largest microfacet slope.
-const ALPHA: Bound = Bound::Between(1e-4, 4.0);
+const ALPHA: Bound = Bound::Between(0.0, 4.0);
 /// Smallest and largest index of refraction.
 const INDEX: Bound = Bound::Between(0.1, 10.0);
 
