@@ -61,7 +61,7 @@ pub struct GroupRange {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// Tiles, each writing its own pixels.
+    /// Tiles, whose samples count for the tile and for as far around as the filter reaches.
     Tiles,
     /// Tiles whose samples splat over the whole film as well.
     SplattingTiles,
