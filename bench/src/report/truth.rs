@@ -97,7 +97,7 @@ fn render(
 ) -> Result<(Truth, f64), String> {
     let path = path(stage, folder, count);
     let settings = stage.settings(variant, count, SEED)?;
-    let provenance = settings.provenance(digest);
+    let provenance = settings.provenance(digest, None);
     let mut seconds = f64::from(count) * 1e-3;
     if !stored(&path, digest, &provenance.settings) {
         eprintln!("{}: reference by {}, {count} per pixel", stage.bench.name, variant.name);
