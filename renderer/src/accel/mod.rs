@@ -1,13 +1,19 @@
 //! Ray casting: the nearest hit and occlusion. The hit depends on the geometry and the ray only, never on the tree.
 //!
-//! obvhs builds binary trees; they are collapsed into 8-wide nodes over leaves of up to eight triangles, and walked with boxes and
-//! triangles eight at a time. Faults of obvhs 0.4.0's own traversal do not reach us: none of it is used.
+//! Small binary trees are built by obvhs, large ones in parallel by `sah.rs`; they are collapsed into 8-wide nodes over leaves of up to
+//! eight triangles, and walked with boxes and triangles eight at a time. Faults of obvhs 0.4.0's own traversal do not reach us: none of
+//! it is used.
 //!
-//! Meshes in world space (see `Geometry::bake`) form one tree; instances, spheres and disks lie in a small tree above.
+//! Meshes in world space (see `Geometry::bake`) form one tree; instances, spheres and disks lie in a tree above.
 
 mod binary;
+mod leaf;
 mod node;
+mod pages;
 mod placed;
+mod plan;
+mod ray;
+mod sah;
 mod simd;
 mod traverse;
 mod wide;

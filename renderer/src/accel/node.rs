@@ -3,7 +3,7 @@
 use crate::math::Vec3;
 
 /// A child of a node: an inner node, or with the top bit set a leaf.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(transparent)]
 pub(super) struct Child(pub u32);
 
@@ -13,6 +13,11 @@ impl Child {
     /// The leaf numbered `index`, below 2^31.
     pub fn leaf(index: u32) -> Self {
         Self(index | Self::LEAF)
+    }
+
+    /// The same where nodes and leaves have moved by so many places.
+    pub fn moved(self, nodes: u32, leaves: u32) -> Self {
+        if self.as_leaf().is_some() { Self(self.0 + leaves) } else { Self(self.0 + nodes) }
     }
 
     /// Its leaf number.
@@ -39,6 +44,12 @@ impl Node {
         Self { planes: [low, high, low, high, low, high], children: [Child(0); 8] }
     };
 
+    /// The children as numbers.
+    #[inline(always)]
+    pub fn children_bits(&self) -> &[u32; 8] {
+        bytemuck::cast_ref(&self.children)
+    }
+
     /// Sets one child.
     pub fn set(&mut self, slot: usize, low: Vec3, high: Vec3, child: Child) {
         for k in 0..3 {
@@ -48,6 +59,11 @@ impl Node {
         self.children[slot] = child;
     }
 }
+
+/// Most triangles of a leaf.
+pub(super) const LEAF_TRIANGLES: usize = 8;
+/// Most vertices of a leaf.
+pub(super) const LEAF_VERTICES: usize = 8;
 
 /// Up to eight triangles between up to eight vertices: two cache lines.
 #[derive(Clone, Debug)]

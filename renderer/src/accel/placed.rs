@@ -1,6 +1,9 @@
-//! Instances, spheres and disks, and the small binary tree over them.
+//! Instances, spheres and disks, and the tree over them.
 
 use super::binary::{self, BinaryNode, Box3};
+use super::node::{Child, Node};
+use super::simd::Simd;
+use super::traverse::{self, Visitor};
 use super::wide::Tree;
 use crate::geometry::{Geometry, Hit, Mesh, ObjectId, WorldDisk, sphere};
 use crate::math::{DAffine3, DVec3, Ray, Transform, Vec3};
@@ -58,24 +61,28 @@ impl Item {
     }
 }
 
-/// Instances, spheres and disks under a binary tree.
+/// Instances, spheres and disks under a tree of 8-wide nodes, one in each leaf.
 #[derive(Debug)]
 pub(super) struct Placed {
     items: Vec<Item>,
-    nodes: Vec<BinaryNode>,
+    nodes: Vec<Node>,
+    root: Option<Child>,
+    /// Largest absolute coordinate.
     reach: f32,
+    simd: Simd,
 }
 
-/// Relative to the largest coordinate: covers the rounding of item boxes and of the box test.
-const PAD: f32 = 16.0 * f32::EPSILON;
+/// Distances of items are rounded in other ways than those of their boxes, whose padding covers all but this.
+const SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
 
 impl Placed {
     /// Builds the tree.
     pub fn new(items: Vec<Item>) -> Self {
         let boxes: Vec<Box3> = items.iter().map(|i| i.bounds).collect();
-        let nodes = binary::build(&boxes);
-        let reach = nodes.first().map_or(0.0, |n| n.bounds.reach());
-        Self { items, nodes, reach }
+        let binary = binary::build(&boxes);
+        let reach = binary.first().map_or(0.0, |n| n.bounds.reach());
+        let (nodes, root) = collapse(&binary);
+        Self { items, nodes, root, reach, simd: Simd::detect() }
     }
 
     #[inline]
@@ -83,66 +90,107 @@ impl Placed {
         self.items.is_empty()
     }
 
-    /// Shortens `t_max` and replaces `best` by what is nearer, or equally near with a smaller index.
-    pub fn closest(&self, trees: &[Tree], ray: &Ray, mut t_max: f32, best: &mut Option<Hit>) {
-        let mut consider = |hit: Hit, t_max: &mut f32| {
-            let key = |h: &Hit| (h.object, h.primitive);
-            if best.as_ref().is_none_or(|b| hit.t < b.t || (hit.t == b.t && key(&hit) < key(b))) {
-                *t_max = hit.t;
-                *best = Some(hit);
-            }
-        };
-        self.walk(ray, &mut t_max, &mut |item, t_max| {
-            let curved = |t: f32| Hit { t, object: item.object, primitive: 0, b: [0.0; 2] };
-            let hit = match &item.kind {
-                Kind::Instance { tree, to_object } => trees[*tree]
-                    .closest(&local_ray(ray, to_object), *t_max)
-                    .map(|h| Hit { t: h.t, object: item.object, primitive: h.id, b: h.b }),
-                Kind::Sphere { centre, radius } => sphere::intersect(*centre, *radius, &until(ray, *t_max)).map(curved),
-                Kind::Disk(disk) => disk.intersect(&until(ray, *t_max)).map(curved),
-            };
-            if let Some(hit) = hit {
-                consider(hit, t_max);
-            }
-            false
-        });
+    /// Replaces `best` by what is nearer than `t_max`, or equally near with a smaller index.
+    pub fn closest(&self, trees: &[Tree], ray: &Ray, t_max: f32, best: &mut Option<Hit>) {
+        let Some(root) = self.root else { return };
+        let mut visitor = Closest { items: &self.items, trees, ray, t_max, best };
+        traverse::visit::<_, true>(&self.nodes, root, ray, self.reach, t_max * SLACK, self.simd, &mut visitor);
     }
 
     /// Whether anything is hit up to `t_max`.
-    pub fn any(&self, trees: &[Tree], ray: &Ray, mut t_max: f32) -> bool {
-        self.walk(ray, &mut t_max, &mut |item, t_max| match &item.kind {
-            Kind::Instance { tree, to_object } => trees[*tree].any(&local_ray(ray, to_object), *t_max),
-            Kind::Sphere { centre, radius } => sphere::intersect(*centre, *radius, &until(ray, *t_max)).is_some(),
-            Kind::Disk(disk) => disk.intersect(&until(ray, *t_max)).is_some(),
+    pub fn any(&self, trees: &[Tree], ray: &Ray, t_max: f32) -> bool {
+        self.root.is_some_and(|root| {
+            let mut visitor = Any { items: &self.items, trees, ray, t_max };
+            traverse::visit::<_, false>(&self.nodes, root, ray, self.reach, t_max * SLACK, self.simd, &mut visitor)
         })
     }
+}
 
-    /// Visits the items whose boxes the ray meets, until `visit` returns true; returns whether it did.
-    fn walk(&self, ray: &Ray, t_max: &mut f32, visit: &mut dyn FnMut(&Item, &mut f32) -> bool) -> bool {
-        if self.nodes.is_empty() {
-            return false;
+/// Wide nodes over items: the child of largest area is opened until there are eight.
+fn collapse(binary: &[BinaryNode]) -> (Vec<Node>, Option<Child>) {
+    let Some(top) = binary.first() else { return (Vec::new(), None) };
+    if top.is_leaf() {
+        return (Vec::new(), Some(Child::leaf(top.index)));
+    }
+    let mut nodes = vec![Node::EMPTY];
+    let mut todo = vec![(0usize, 0u32)];
+    while let Some((at, source)) = todo.pop() {
+        let first = binary[source as usize].index;
+        let mut children = vec![first, first + 1];
+        while children.len() < 8 {
+            let area = |c: u32| binary[c as usize].bounds.half_area();
+            let inner = (0..children.len()).filter(|&i| !binary[children[i] as usize].is_leaf());
+            let Some(i) = inner.max_by(|&i, &j| area(children[i]).total_cmp(&area(children[j]))) else { break };
+            let first = binary[children[i] as usize].index;
+            children[i] = first;
+            children.push(first + 1);
         }
-        let pad = PAD * (ray.o.abs().max_element() + self.reach);
-        // Deferred nodes: at most one per level, and `binary::build` keeps to `MAX_DEPTH` levels.
-        let mut stack = [0u32; binary::MAX_DEPTH + 1];
-        let mut len = 1;
-        while len > 0 {
-            len -= 1;
-            let node = &self.nodes[stack[len] as usize];
-            if !meets(&node.bounds, ray, pad, *t_max) {
-                continue;
-            }
-            if node.is_leaf {
-                if visit(&self.items[node.index as usize], t_max) {
-                    return true;
-                }
-                continue;
-            }
-            stack[len] = node.index;
-            stack[len + 1] = node.index + 1;
-            len += 2;
+        for (slot, &c) in children.iter().enumerate() {
+            let b = &binary[c as usize];
+            let child = if b.is_leaf() {
+                Child::leaf(b.index)
+            } else {
+                todo.push((nodes.len(), c));
+                nodes.push(Node::EMPTY);
+                Child(nodes.len() as u32 - 1)
+            };
+            nodes[at].set(slot, b.bounds.low, b.bounds.high, child);
+        }
+    }
+    (nodes, Some(Child(0)))
+}
+
+/// Keeps the nearest hit.
+struct Closest<'a> {
+    items: &'a [Item],
+    trees: &'a [Tree],
+    ray: &'a Ray,
+    t_max: f32,
+    best: &'a mut Option<Hit>,
+}
+
+impl Visitor for Closest<'_> {
+    #[inline(always)]
+    fn visit(&mut self, index: u32, t_max: &mut f32) -> bool {
+        let item = &self.items[index as usize];
+        let curved = |t: f32| Hit { t, object: item.object, primitive: 0, b: [0.0; 2] };
+        let ray = self.ray;
+        let hit = match &item.kind {
+            Kind::Instance { tree, to_object } => self.trees[*tree]
+                .closest(&local_ray(ray, to_object), self.t_max)
+                .map(|h| Hit { t: h.t, object: item.object, primitive: h.id, b: h.b }),
+            Kind::Sphere { centre, radius } => sphere::intersect(*centre, *radius, &until(ray, self.t_max)).map(curved),
+            Kind::Disk(disk) => disk.intersect(&until(ray, self.t_max)).map(curved),
+        };
+        let key = |h: &Hit| (h.object, h.primitive);
+        if let Some(hit) = hit
+            && self.best.as_ref().is_none_or(|b| hit.t < b.t || (hit.t == b.t && key(&hit) < key(b)))
+        {
+            self.t_max = hit.t;
+            *t_max = hit.t * SLACK;
+            *self.best = Some(hit);
         }
         false
+    }
+}
+
+/// Ends at the first hit.
+struct Any<'a> {
+    items: &'a [Item],
+    trees: &'a [Tree],
+    ray: &'a Ray,
+    t_max: f32,
+}
+
+impl Visitor for Any<'_> {
+    #[inline(always)]
+    fn visit(&mut self, index: u32, _: &mut f32) -> bool {
+        let ray = self.ray;
+        match &self.items[index as usize].kind {
+            Kind::Instance { tree, to_object } => self.trees[*tree].any(&local_ray(ray, to_object), self.t_max),
+            Kind::Sphere { centre, radius } => sphere::intersect(*centre, *radius, &until(ray, self.t_max)).is_some(),
+            Kind::Disk(disk) => disk.intersect(&until(ray, self.t_max)).is_some(),
+        }
     }
 }
 
@@ -156,24 +204,4 @@ fn local_ray(ray: &Ray, to_object: &DAffine3) -> Ray {
     let o = to_object.transform_point3(ray.o.as_dvec3()).as_vec3();
     let d = to_object.transform_vector3(ray.d.as_dvec3()).as_vec3();
     Ray::segment(o, d, ray.t_max)
-}
-
-/// Whether a ray meets a box, padded to all sides, within [0, `t_max`].
-fn meets(b: &Box3, ray: &Ray, pad: f32, t_max: f32) -> bool {
-    // The roundings of the divisions are relative to the distances themselves.
-    const SLACK: f32 = 1.0 + 4.0 * f32::EPSILON;
-    let (mut near, mut far) = (0.0f32, t_max * SLACK);
-    for k in 0..3 {
-        let (low, high) = (b.low[k] - pad - ray.o[k], b.high[k] + pad - ray.o[k]);
-        if ray.d[k] == 0.0 {
-            if low > 0.0 || high < 0.0 {
-                return false;
-            }
-            continue;
-        }
-        let (t0, t1) = (low / ray.d[k], high / ray.d[k]);
-        near = near.max(t0.min(t1));
-        far = far.min(t0.max(t1) * SLACK);
-    }
-    near <= far
 }

@@ -88,14 +88,19 @@ impl Shear {
         (t <= t_max).then_some(TriangleHit { t, b: [v * inv_det, w * inv_det] })
     }
 
-    /// Ray parameter of the triangle's plane when it is positive, in double precision.
-    #[inline(never)]
-    fn plane_distance(&self, a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> Option<f32> {
-        let wide = |x: [f32; 3]| DVec3::from_array(x.map(f64::from));
+    /// Ray parameter of the triangle's plane when it is positive, in double precision. Corners in permuted axes.
+    #[inline(always)]
+    pub fn plane_distance(&self, a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> Option<f32> {
+        let wide = |x: [f32; 3]| DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
         let o = wide(self.o);
-        let [a, b, c] = [a, b, c].map(|p| wide(p) - o);
+        let (a, b, c) = (wide(a) - o, wide(b) - o, wide(c) - o);
         let n = (b - a).cross(c - a);
-        let t = n.dot(a) / n.dot(wide(self.d));
+        let (over, under) = (n.dot(a), n.dot(wide(self.d)));
+        // A ray that leaves a surface asks it first of all; it is behind, and a division is slow.
+        if (over > 0.0) != (under > 0.0) {
+            return None;
+        }
+        let t = over / under;
         (t > 0.0 && t.is_finite()).then_some(t as f32)
     }
 }
