@@ -118,7 +118,7 @@ fn a_whole_job(probe: &mut Probe) {
     loop {
         let plan = merger.plan().clone();
         for id in 0..plan.unit_count() {
-            let Some(UnitKind::Tile { rect, start, end }) = plan.unit(id).map(|u| u.kind) else { return };
+            let Some(UnitKind::Tile { rect, start, end, .. }) = plan.unit(id).map(|u| u.kind) else { return };
             let n = end - start;
             let mut aov = Aov::default();
             for _ in 0..n {
