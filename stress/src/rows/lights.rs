@@ -91,9 +91,9 @@ pub fn tiny(probe: &mut Probe) {
     );
     known(probe, "square of 1e-12 sr", scene, &kinds, mean(square));
     // Elsewhere rounding changes its area, which is warned of.
-    let m = facing(DVec3::new(0.3, 0.9, -0.2), -DVec3::Y, DVec3::splat(radius));
+    let m = facing(DVec3::new(0.3, 0.9, -0.2), -DVec3::Y, DVec3::splat(0.1 * radius));
     let scene = floor(vec![lamp(ShapeKind::Rectangle, m, 1, radiance)], Vec::new());
-    probe.build_warned("a square of 1e-12 sr off the axes", scene, "single precision");
+    probe.build_warned("a square of 1e-14 sr off the axes", scene, "single precision");
     let point = LightDesc::Point { position: DVec3::Y, intensity: Rgb::ONE };
     known(probe, "point", floor(Vec::new(), vec![point]), &kinds, mean(|p| 1.0 / (p - DVec3::Y).length().powi(3)));
 }
