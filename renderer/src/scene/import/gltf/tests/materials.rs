@@ -257,7 +257,7 @@ fn what_is_not_supported_is_said_once_with_the_materials() {
 #[test]
 fn numbers_out_of_range_are_pulled_in_with_a_warning() {
     let file = File::with_material(json!({
-        "pbrMetallicRoughness": { "baseColorFactor": [2, -1, 0.5, 1], "roughnessFactor": 1e39, "metallicFactor": -3 },
+        "pbrMetallicRoughness": { "baseColorFactor": [2, -1, 0.5, 1], "roughnessFactor": 1e38, "metallicFactor": -3 },
         "extensions": { "KHR_materials_ior": { "ior": 0.5 } },
     }));
     let (scene, warnings) = file.load();

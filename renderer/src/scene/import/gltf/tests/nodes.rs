@@ -133,10 +133,12 @@ fn hidden_nodes_are_left_out_with_their_children() {
 fn transforms_must_stay_finite() {
     for (key, value, words) in [
         ("matrix", json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2]), "last row"),
-        ("matrix", json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1e39, 0, 0, 1]), "beyond 1e18"),
+        ("matrix", json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1e38, 0, 0, 1]), "beyond 1e18"),
+        ("matrix", json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1e39, 0, 0, 1]), "beyond single precision"),
         ("translation", json!([1e19, 0, 0]), "beyond 1e18"),
         ("scale", json!([1e19, 1, 1]), "must stay below 1e18"),
-        ("rotation", json!([1e39, 0, 0, 1]), "quaternion"),
+        ("rotation", json!([0, 0, 0, 0]), "quaternion"),
+        ("rotation", json!([1e39, 0, 0, 1]), "beyond single precision"),
     ] {
         let mut file = File::triangle();
         file.json["nodes"][0][key] = value.clone();

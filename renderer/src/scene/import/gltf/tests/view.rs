@@ -122,7 +122,6 @@ fn faulty_lights_are_refused() {
         (json!({ "type": "spot" }), "needs its cone"),
         (json!({ "type": "area" }), "expected point, spot or directional"),
         (json!({ "type": "point", "intensity": -1 }), "from 0"),
-        (json!({ "type": "point", "intensity": 1e39 }), "from 0"),
         (json!({ "type": "spot", "spot": { "innerConeAngle": 0.5, "outerConeAngle": 0.4 } }), "out of range"),
         (json!({ "type": "spot", "spot": { "outerConeAngle": 1.6 } }), "out of range"),
     ] {
