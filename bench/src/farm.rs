@@ -38,6 +38,35 @@ pub struct Report {
     coordinator_share: Option<f64>,
 }
 
+/// A coordinator and its workers of one thread each, on loopback; they end with this value.
+pub struct Farm {
+    url: String,
+    coordinator: Running,
+    workers: Vec<Running>,
+}
+
+impl Farm {
+    /// Starts them with data and caches in `folder`.
+    pub fn start(lightfarm: &Path, listen: &str, folder: &Path, workers: usize) -> Result<Self, String> {
+        let url = format!("http://{listen}");
+        let data = folder.join("data").display().to_string();
+        let coordinator = start(lightfarm, &["coordinator", "--listen", listen, "--data", &data])?;
+        std::thread::sleep(Duration::from_secs(1));
+        let worker = |i: usize| {
+            let (name, cache) = (format!("worker-{i}"), folder.join(format!("worker-{i}")).display().to_string());
+            start(lightfarm, &["worker", "--coordinator", &url, "--name", &name, "--threads", "1", "--cache", &cache])
+        };
+        let workers = (0..workers).map(worker).collect::<Result<_, _>>()?;
+        std::thread::sleep(Duration::from_secs(1));
+        Ok(Self { url, coordinator, workers })
+    }
+
+    /// The start of a command that submits a job here and waits for it.
+    pub fn submit(&self) -> [&str; 4] {
+        ["submit", "--coordinator", &self.url, "--wait"]
+    }
+}
+
 /// A process that ends with this value.
 struct Running(Child);
 
@@ -52,36 +81,27 @@ impl Drop for Running {
 /// Runs the benchmark.
 pub fn run(args: &Args) -> Result<Report, String> {
     let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
-    let url = format!("http://{}", args.listen);
-    let data = folder.path().join("data");
-    let coordinator = start(args, &["coordinator", "--listen", &args.listen, "--data", &data.display().to_string()])?;
-    std::thread::sleep(Duration::from_secs(1));
-    let workers = ["one", "two"].map(|name| {
-        let cache = folder.path().join(name).display().to_string();
-        start(args, &["worker", "--coordinator", &url, "--name", name, "--threads", "1", "--cache", &cache])
-    });
-    let workers: Vec<Running> = workers.into_iter().collect::<Result<_, _>>()?;
-    std::thread::sleep(Duration::from_secs(1));
-
-    let (local, farm) = (folder.path().join("local.exr"), folder.path().join("farm.exr"));
+    let farm = Farm::start(&args.lightfarm, &args.listen, folder.path(), 2)?;
+    let (local, distant) = (folder.path().join("local.exr"), folder.path().join("farm.exr"));
     let (mut render_s, mut farm_s) = (Vec::new(), Vec::new());
     for run in 0..=args.runs {
         // Each run has its own seed, so that nothing can be answered from what is stored.
         let seed = run.to_string();
-        let a = timed(args, &["render", "--threads", "2"], &seed, &local)?;
-        let b = timed(args, &["submit", "--coordinator", &url, "--wait"], &seed, &farm)?;
+        let timed = |verb: &[&str], out| timed(&args.lightfarm, verb, &args.scene, args.spp, &seed, out);
+        let a = timed(&["render", "--threads", "2"], &local)?;
+        let b = timed(&farm.submit(), &distant)?;
         if run > 0 {
             render_s.push(a);
             farm_s.push(b);
         }
-        let equal = Command::new(&args.lightfarm).args(["diff", "--bit-exact"]).args([&local, &farm]).output();
+        let equal = Command::new(&args.lightfarm).args(["diff", "--bit-exact"]).args([&local, &distant]).output();
         if !equal.is_ok_and(|o| o.status.success()) {
             return Err("the farm's image is not that of the local render".into());
         }
     }
     let mut ratios: Vec<f64> = farm_s.iter().zip(&render_s).map(|(f, r)| f / r).collect();
-    let busy: Option<f64> = workers.iter().map(|w| cpu_seconds(w.0.id())).sum();
-    let coordinator_share = cpu_seconds(coordinator.0.id()).zip(busy).map(|(c, w)| c / w);
+    let busy: Option<f64> = farm.workers.iter().map(|w| cpu_seconds(w.0.id())).sum();
+    let coordinator_share = cpu_seconds(farm.coordinator.0.id()).zip(busy).map(|(c, w)| c / w);
     Ok(Report {
         render_median_s: median(&mut render_s.clone()),
         farm_median_s: median(&mut farm_s.clone()),
@@ -104,27 +124,23 @@ impl std::fmt::Display for Report {
     }
 }
 
-fn start(args: &Args, line: &[&str]) -> Result<Running, String> {
-    let child = Command::new(&args.lightfarm)
-        .args(line)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn();
-    child.map(Running).map_err(|e| format!("{} can't be started: {e}; build it first", args.lightfarm.display()))
+fn start(lightfarm: &Path, line: &[&str]) -> Result<Running, String> {
+    let child =
+        Command::new(lightfarm).args(line).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    child.map(Running).map_err(|e| format!("{} can't be started: {e}; build it first", lightfarm.display()))
 }
 
 /// Seconds from start to end of a whole command.
-fn timed(args: &Args, verb: &[&str], seed: &str, out: &Path) -> Result<f64, String> {
+pub fn timed(lightfarm: &Path, verb: &[&str], scene: &Path, spp: u32, seed: &str, out: &Path) -> Result<f64, String> {
     let started = Instant::now();
-    let output = Command::new(&args.lightfarm)
+    let output = Command::new(lightfarm)
         .args(verb)
-        .arg(&args.scene)
-        .args(["--spp", &args.spp.to_string(), "--seed", seed, "-o"])
+        .arg(scene)
+        .args(["--spp", &spp.to_string(), "--seed", seed, "-o"])
         .arg(out)
         .stdin(Stdio::null())
         .output()
-        .map_err(|e| format!("{} can't be started: {e}; build it first", args.lightfarm.display()))?;
+        .map_err(|e| format!("{} can't be started: {e}; build it first", lightfarm.display()))?;
     if !output.status.success() {
         return Err(format!("{verb:?} failed: {}", String::from_utf8_lossy(&output.stderr)));
     }

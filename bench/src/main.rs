@@ -8,6 +8,7 @@ mod error;
 mod farm;
 mod meshes;
 mod rays;
+mod report;
 mod samples;
 
 use clap::{Parser, Subcommand};
@@ -32,6 +33,8 @@ enum What {
     Samples(samples::Args),
     /// Error against time of integrators, compared.
     Error(error::Args),
+    /// Error against time on many scenes, next to other renderers, and growth of cost: an HTML page.
+    Report(report::Args),
     /// Two one-thread workers against one two-thread render.
     Farm(farm::Args),
     /// Error times cost of path, bdpt and mmlt, and whether `auto` chooses the best of them.
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
         What::Rays(args) => rays::run(args).map(|r| figures(show(cli.json, &r, rays::table))),
         What::Samples(args) => samples::run(args).map(|r| figures(show(cli.json, &r, |r| samples::table(r)))),
         What::Error(args) => error::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
+        What::Report(args) => report::run(args).map(figures),
         What::Farm(args) => farm::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Auto(args) => auto::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Agree(args) => agree::run(args).map(|r| (show(cli.json, &r, agree::table), r.passed)),

@@ -1,7 +1,6 @@
 //! The `lightfarm` command. This file only parses; each subcommand is a file of `commands/`.
 
 mod commands;
-mod diff;
 mod exit;
 mod farm;
 mod options;

@@ -1,14 +1,14 @@
 //! Error against time, by many short independent renders (Celarek, Jakob, Wimmer, Lehtinen 2019).
 
-mod measure;
+pub mod measure;
 mod preset;
-mod process;
-mod reference;
+pub mod process;
+pub mod reference;
 mod report;
-mod runs;
-mod stats;
+pub mod runs;
+pub mod stats;
 mod table;
-mod variant;
+pub mod variant;
 
 pub use report::Report;
 

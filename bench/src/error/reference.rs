@@ -14,7 +14,8 @@ pub struct ReferencePicture {
     pub height: u32,
     /// Whether it tells its variance.
     pub has_variance: bool,
-    target: Target,
+    /// The picture and its variance.
+    pub target: Target,
     metadata: Option<Metadata>,
 }
 

@@ -47,7 +47,8 @@ pub fn render_rounds(
     Ok(runs)
 }
 
-fn render(scene: &Scene, settings: &RenderSettings, threads: usize) -> Result<Run, String> {
+/// One render; its variant is left to the caller.
+pub fn render(scene: &Scene, settings: &RenderSettings, threads: usize) -> Result<Run, String> {
     process::reset_peak();
     let (cpu, started) = (process::cpu_seconds(), Instant::now());
     let outcome = render_local(scene, settings, &LocalOptions { threads }, &Stop::new(), &mut |_| {});

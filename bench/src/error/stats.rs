@@ -1,18 +1,26 @@
 //! Confidence intervals over rounds of renders.
 
 use renderer::math::{exp64, ln64};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 use statcheck::student_quantile;
 
 /// A figure with its 95 % confidence interval; the ends are not finite where the rounds can't tell them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// The estimate.
+    #[serde(deserialize_with = "or_nan")]
     pub value: f64,
     /// Lower end.
+    #[serde(deserialize_with = "or_nan")]
     pub low: f64,
     /// Upper end.
+    #[serde(deserialize_with = "or_nan")]
     pub high: f64,
+}
+
+/// JSON has no NaN: it is written as null.
+pub fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 /// The mean over rounds, with Student's interval.

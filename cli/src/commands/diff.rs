@@ -1,12 +1,12 @@
 //! `lightfarm diff`: how far a picture is from a reference.
 
-use crate::diff::pair::{self, Pair};
-use crate::diff::significance::{self, Agreement, Assumptions};
-use crate::diff::{exact, flip, map, metrics::Metrics};
 use crate::exit::{Failure, Outcome};
 use crate::options;
 use crate::output::Console;
 use crate::save;
+use compare::pair::{self, Pair};
+use compare::significance::{self, Agreement, Assumptions};
+use compare::{exact, flip, map, metrics::Metrics};
 use renderer::film::exr::Picture;
 use renderer::scene::desc::FilterDesc;
 use serde::Serialize;
@@ -68,11 +68,12 @@ struct Report {
 
 /// Runs it.
 pub fn run(args: Args, console: &Console) -> Outcome {
-    let (a, b) = (pair::read(&args.a)?, pair::read(&args.b)?);
+    let input = |message: String| Failure::Input(format!("error: {message}"));
+    let (a, b) = (pair::read(&args.a).map_err(input)?, pair::read(&args.b).map_err(input)?);
     if args.bit_exact {
         return bit_exact(&a, &b, console);
     }
-    let pair = Pair::new(&a, &b)?;
+    let pair = Pair::new(&a, &b).map_err(input)?;
     let metrics = Metrics::of(&pair).ok_or_else(|| {
         Failure::Input("error: no pixel is finite in both pictures: there is nothing to compare".into())
     })?;

@@ -1,6 +1,5 @@
 //! Two pictures of the same size, and the pixels that can be compared.
 
-use crate::exit::Failure;
 use renderer::film::exr::{self, Picture};
 use std::path::Path;
 
@@ -21,12 +20,12 @@ pub struct Pair {
 
 impl Pair {
     /// The colours of two files.
-    pub fn new(a: &Picture, b: &Picture) -> Result<Self, Failure> {
+    pub fn new(a: &Picture, b: &Picture) -> Result<Self, String> {
         if (a.width, a.height) != (b.width, b.height) {
-            return Err(Failure::Input(format!(
-                "error: pictures of different sizes can't be compared: {} x {} and {} x {} pixels",
+            return Err(format!(
+                "pictures of different sizes can't be compared: {} x {} and {} x {} pixels",
                 a.width, a.height, b.width, b.height
-            )));
+            ));
         }
         Ok(Self::from_pixels(a.width, a.height, colours(a)?, colours(b)?))
     }
@@ -51,14 +50,14 @@ impl Pair {
 }
 
 /// Reads an EXR.
-pub fn read(path: &Path) -> Result<Picture, Failure> {
-    let fail = |e: String| Failure::Input(format!("error: {}: {e}", path.display()));
+pub fn read(path: &Path) -> Result<Picture, String> {
+    let fail = |e: String| format!("{}: {e}", path.display());
     let bytes = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
     exr::decode(&bytes).map_err(|e| fail(format!("can't be read as OpenEXR: {e}")))
 }
 
 /// The colours of a picture: R, G, B of the default layer, else of `beauty` or of the only layer that has them; else its luminance.
-fn colours(p: &Picture) -> Result<Vec<[f32; 3]>, Failure> {
+pub fn colours(p: &Picture) -> Result<Vec<[f32; 3]>, String> {
     if let Some(v) = p.triple(["R", "G", "B"]).or_else(|| p.triple(["beauty.R", "beauty.G", "beauty.B"])) {
         return Ok(v);
     }
@@ -75,6 +74,6 @@ fn colours(p: &Picture) -> Result<Vec<[f32; 3]>, Failure> {
     };
     grey.map(|g| g.iter().map(|v| [*v; 3]).collect()).ok_or_else(|| {
         let names: Vec<&str> = p.channels.iter().map(|(n, _)| n.as_str()).collect();
-        Failure::Input(format!("error: expected channels R, G, B or Y, found {}", names.join(", ")))
+        format!("expected channels R, G, B or Y, found {}", names.join(", "))
     })
 }

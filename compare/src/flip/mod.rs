@@ -7,7 +7,7 @@
 mod colour;
 mod filter;
 
-use super::pair::Pair;
+use crate::pair::Pair;
 use filter::{Detectors, Plane, Sensitivity, Size};
 use renderer::math::fns::{ln, pow};
 use std::sync::atomic::{AtomicUsize, Ordering};
