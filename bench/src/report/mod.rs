@@ -4,7 +4,7 @@ mod document;
 mod equal;
 mod evaluate;
 mod external;
-mod growth;
+pub mod growth;
 mod measure;
 mod page;
 mod picture;
