@@ -167,7 +167,9 @@ fn draw(out: &mut String, s: &Series, points: &[(f64, f64, f64, f64)], x: &Axis,
     let _ = write!(out, "<polyline points='{}' fill='none' stroke='{colour}' stroke-width='2'{dash}/>", line.join(" "));
     for p in points {
         let shape = format!("cx='{:.1}' cy='{:.1}' r='3' fill='{colour}'", x.at(p.0), y.at(p.1));
-        let title = format!("{}: {:.4} s, {:.4e} [{:.3e}, {:.3e}]", escape(&s.name), p.0, p.1, p.2, p.3);
+        let known = p.2.is_finite() && p.3.is_finite();
+        let interval = if known { format!(" [{:.3e}, {:.3e}]", p.2, p.3) } else { String::new() };
+        let title = format!("{}: {:.4} s, {:.4e}{interval}", escape(&s.name), p.0, p.1);
         let _ = write!(out, "<circle {shape}><title>{title}</title></circle>");
     }
 }
