@@ -142,11 +142,12 @@ impl GroupFilm {
         }
     }
 
-    /// The parts of the mean of pixel `i` while the group is open: of tiles, and of splats.
-    pub fn parts(&self, i: usize) -> ([f64; 3], [f64; 3]) {
-        let Self::Open { sums, weights, splats, splat_weight, .. } = self else { return ([0.0; 3], [0.0; 3]) };
-        let part = |sums: &[[f64; 3]], n: f64| sums.get(i).filter(|_| n > 0.0).map_or([0.0; 3], |s| s.map(|v| v / n));
-        (part(sums, weights.get(i).copied().unwrap_or(0.0)), part(splats, *splat_weight))
+    /// What splats contribute to the mean of pixel `i`, while the group is open.
+    pub fn splats(&self, i: usize) -> [f64; 3] {
+        match self {
+            Self::Open { splats, splat_weight, .. } if *splat_weight > 0.0 => splats[i].map(|v| v / splat_weight),
+            _ => [0.0; 3],
+        }
     }
 
     /// Rounds the means to f32 and forgets the sums. Only for a group that gets no more samples.

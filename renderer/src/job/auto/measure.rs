@@ -22,8 +22,6 @@ pub struct Sample {
 pub enum Part {
     /// All of it.
     Whole,
-    /// What ordinary samples found.
-    Tiles,
     /// What chains found.
     Splats,
 }
@@ -35,8 +33,7 @@ impl Sample {
         let pixels = 0..s.width as usize * s.height as usize;
         let value = |g: &GroupFilm, i: usize| match part {
             Part::Whole => g.pixel(i).0,
-            Part::Tiles => g.parts(i).0,
-            Part::Splats => g.parts(i).1,
+            Part::Splats => g.splats(i),
         };
         let groups = trial.groups().iter().map(|g| pixels.clone().map(|i| value(g, i)).collect()).collect();
         Self { width: s.width as usize, height: s.height as usize, groups }
@@ -55,6 +52,18 @@ impl Sample {
         std::array::from_fn(|c| self.groups.iter().map(|g| square(g[i][c] - mean[c])).sum::<f64>() / (n - 1.0).max(1.0))
     }
 
+    /// Means of all blocks, row by row.
+    fn block_means(&self) -> Vec<[f64; 3]> {
+        let across = self.width.div_ceil(BLOCK);
+        let mut sums = vec![([0.0; 3], 0.0); across * self.height.div_ceil(BLOCK)];
+        for i in 0..self.width * self.height {
+            let (sum, pixels) = &mut sums[i / self.width / BLOCK * across + i % self.width / BLOCK];
+            sum.iter_mut().zip(self.mean(i)).for_each(|(to, v)| *to += v);
+            *pixels += 1.0;
+        }
+        sums.into_iter().map(|(sum, pixels)| sum.map(|v| v / pixels)).collect()
+    }
+
     /// `1 / (I^2 + 0.01)` of every pixel, I being the mean of two pictures of the same size. All that is compared is weighed alike: what
     /// a pixel that few samples have found bright excuses, it excuses for all.
     pub fn weights(&self, other: &Self) -> Weights {
@@ -65,15 +74,18 @@ impl Sample {
         Weights { width: self.width, height: self.height, pixels: (0..self.width * self.height).map(of).collect() }
     }
 
-    /// Mean relative variance of one group. Where `own` says so, pixels that this picture has brighter than the weights know are weighed
-    /// by that: it may be finer, and a lamp that covers a few pixels here covers none there.
+    /// Mean relative variance of one group. Where `own` says so, blocks that this picture has brighter than the weights know are weighed
+    /// by that: chains find light that few of the samples behind the weights have found.
     pub fn relative_variance(&self, weights: &Weights, own: bool) -> f64 {
         let mut sum = 0.0;
+        let bright = if own { self.block_means() } else { Vec::new() };
+        let across = self.width.div_ceil(BLOCK);
         for i in 0..self.width * self.height {
-            let weight = weights.pixels[weights.at(i % self.width, i / self.width, self.width, self.height)];
-            let (v, mean) = (self.variance(i), self.mean(i));
-            let weight = |c: usize| if own { weight[c].min(1.0 / (mean[c] * mean[c] + FLOOR)) } else { weight[c] };
-            sum += (0..3).map(|c| v[c] * weight(c)).sum::<f64>();
+            let (x, y) = (i % self.width, i / self.width);
+            let weight = weights.pixels[weights.at(x, y, self.width, self.height)];
+            let mean = bright.get(y / BLOCK * across + x / BLOCK).copied().unwrap_or_default();
+            let v = self.variance(i);
+            sum += (0..3).map(|c| v[c] * weight[c].min(1.0 / (mean[c] * mean[c] + FLOOR))).sum::<f64>();
         }
         sum / (3 * self.width * self.height) as f64
     }

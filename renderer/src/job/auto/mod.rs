@@ -42,8 +42,37 @@ const MUTATIONS: u32 = 4;
 const EASY: f64 = 0.2;
 
 /// What is tried, in this order.
-const TRIED: [IntegratorKind; 4] =
-    [IntegratorKind::Path, IntegratorKind::Bdpt, IntegratorKind::Moments, IntegratorKind::Mmlt];
+const TRIED: [Tried; 5] = [Tried::Path, Tried::Bdpt, Tried::Moments, Tried::Direct, Tried::Mmlt];
+/// Trials that tell of path and bdpt.
+const WITHOUT_CHAINS: usize = 3;
+/// How much better chains must look: what a short trial says of them is the least certain.
+const MARGIN: f64 = 1.3;
+
+/// A trial.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Tried {
+    /// By `path`.
+    Path,
+    /// By `bdpt`.
+    Bdpt,
+    /// What `path` would find seldom.
+    Moments,
+    /// By `path`, the short paths that ordinary samples carry where chains carry the others.
+    Direct,
+    /// By `mmlt`.
+    Mmlt,
+}
+
+impl Tried {
+    fn integrator(self) -> IntegratorKind {
+        match self {
+            Self::Path | Self::Direct => IntegratorKind::Path,
+            Self::Bdpt => IntegratorKind::Bdpt,
+            Self::Moments => IntegratorKind::Moments,
+            Self::Mmlt => IntegratorKind::Mmlt,
+        }
+    }
+}
 
 /// What a job by `auto` chose, and why.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -102,7 +131,7 @@ impl Auto {
     /// The settings of the first render.
     pub fn next(&mut self, job: &RenderSettings) -> RenderSettings {
         if work(job) >= WORTH_IT {
-            return trial(job, IntegratorKind::Path);
+            return trial(job, Tried::Path);
         }
         let why = "the job is too small for trials".into();
         self.choice = Some(Choice { integrator: IntegratorKind::Path, why, trials: Vec::new(), share: Some(0.0) });
@@ -114,7 +143,7 @@ impl Auto {
         self.met.add(&trial_done.counters());
         let trials: Vec<&Rendering> = self.trials.iter().chain([trial_done]).collect();
         let outcomes = outcomes(&trials);
-        let easy = trials.len() == 3 && outcomes.iter().any(|o| o.cost() < EASY);
+        let easy = trials.len() == WITHOUT_CHAINS && outcomes.iter().any(|o| o.cost() < EASY);
         if trials.len() < TRIED.len() && !easy {
             return trial(job, TRIED[trials.len()]);
         }
@@ -166,15 +195,12 @@ fn work(job: &RenderSettings) -> f64 {
     let b = &job.budget;
     let counted = b.spp.map(|n| f64::from(n) * job.pixels());
     let timed = b.time_s.map(|t| t * RATE);
-    counted.into_iter().chain(timed).fold(f64::INFINITY, f64::min).min(if counted.is_none() && timed.is_none() {
-        UNKNOWN
-    } else {
-        f64::INFINITY
-    })
+    counted.into_iter().chain(timed).min_by(f64::total_cmp).unwrap_or(UNKNOWN)
 }
 
 /// The settings of a trial.
-fn trial(job: &RenderSettings, integrator: IntegratorKind) -> RenderSettings {
+fn trial(job: &RenderSettings, tried: Tried) -> RenderSettings {
+    let integrator = tried.integrator();
     let samples = (SHARE * work(job)).clamp(SAMPLES.0, SAMPLES.1);
     // As many samples in each group as the job will have, as far as that is affordable: stratification shows.
     let of_group = job.budget.spp.unwrap_or(u32::MAX).div_ceil(8).clamp(2, 4);
@@ -187,7 +213,7 @@ fn trial(job: &RenderSettings, integrator: IntegratorKind) -> RenderSettings {
     let pixels = (samples / f64::from(per_pixel)).min(job.pixels());
     let scale = (pixels / job.pixels()).sqrt();
     let side = |of: u32| ((f64::from(of) * scale).round() as u32).clamp(1, of);
-    let seed = hash_words(&[job.seed, TRIAL, integrator as u64]);
+    let seed = hash_words(&[job.seed, TRIAL, tried as u64]);
     let mut settings = RenderSettings {
         width: side(job.width),
         height: side(job.height),
@@ -195,6 +221,10 @@ fn trial(job: &RenderSettings, integrator: IntegratorKind) -> RenderSettings {
         replicates: GROUPS,
         ..job.rendered_by(integrator, Some(spp))
     };
+    if tried == Tried::Direct {
+        let direct = job.mmlt.direct_edges;
+        settings.max_depth = Some(job.max_depth.map_or(direct, |n| n.min(direct)));
+    }
     if integrator == IntegratorKind::Mmlt {
         // A render that a time ends keeps what ordinary samples found apart from what chains found.
         settings.budget = Budget { mpp: Some(MUTATIONS), time_s: Some(f64::MAX), ..Budget::default() };
@@ -227,14 +257,13 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
             work: own(bdpt, IntegratorKind::Bdpt),
         },
     ];
-    if let Some(mmlt) = trials.get(3) {
+    if let [_, _, _, samples, mmlt] = trials {
         let s = mmlt.settings();
-        let pixels = s.pixels();
-        let (tiles, splats) = (Sample::new(mmlt, Part::Tiles), Sample::new(mmlt, Part::Splats));
+        let splats = Sample::new(mmlt, Part::Splats);
         let direct = f64::from(s.mmlt.direct_share);
-        let of_mutations = splats.relative_variance(&weights, false) * of_group(mmlt);
-        let made = mmlt.spent().samples.samples as f64 / (pixels * f64::from(GROUPS));
-        let of_samples = tiles.relative_variance(&weights, true) * made / direct;
+        let of_mutations = splats.relative_variance(&weights, true) * of_group(mmlt);
+        let of_samples =
+            Sample::new(samples, Part::Whole).relative_variance(&weights, false) * of_group(samples) / direct;
         let whole = Sample::new(mmlt, Part::Whole);
         let unseen = whole.unseen(&bdpt_sample, f64::from(mmlt.done_spp()));
         let spent = mmlt.spent();
@@ -263,7 +292,8 @@ fn work_of(c: &Counters, kind: IntegratorKind) -> f64 {
 /// The choice and the settings of the render.
 fn choose(job: &RenderSettings, trials: &[&Rendering], outcomes: Vec<Outcome>) -> (Choice, RenderSettings) {
     let finite = |o: &&Outcome| o.cost().is_finite();
-    let best = outcomes.iter().filter(finite).min_by(|a, b| a.cost().total_cmp(&b.cost()));
+    let handicap = |o: &Outcome| o.cost() * if o.integrator == IntegratorKind::Mmlt { MARGIN } else { 1.0 };
+    let best = outcomes.iter().filter(finite).min_by(|a, b| handicap(a).total_cmp(&handicap(b)));
     let best =
         best.copied().unwrap_or(Outcome { integrator: IntegratorKind::Path, variance: 0.0, unseen: 0.0, work: 1.0 });
     let kind = |r: &Rendering| r.settings().integrator;
