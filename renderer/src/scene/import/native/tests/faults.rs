@@ -26,10 +26,10 @@ fn wrong_keys_are_named_with_the_nearest() {
     fault("[render]\nxyzzy = 1", 3, 1, &["known are: filter, integrator, max_depth"]);
     fault("[render]\nintegrator = 'paht'", 3, 14, &["did you mean \"path\"?"]);
     fault(
-        "[render]\nintegrator = 'auto'",
+        "[render]\nintegrator = 'sppm'",
         3,
         14,
-        &["`integrator` is \"auto\", expected one of: path, light, bdpt, mmlt"],
+        &["`integrator` is \"sppm\", expected one of: path, light, bdpt, mmlt, auto"],
     );
     let scene = "[[shapes]]\nkind = 'cube'\nmaterial = 'wod'\n[materials.wood]\nkind = 'diffuse'";
     fault(scene, 4, 12, &["no material is called \"wod\"", "did you mean \"wood\"?"]);
