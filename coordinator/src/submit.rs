@@ -5,6 +5,7 @@ use crate::farm::Farm;
 use crate::hub::Hub;
 use crate::job::{JobSpec, JobState};
 use crate::store::{Change, received};
+use renderer::integrator::IntegratorKind;
 use renderer::job::RenderSettings;
 use renderer::scene::bundle::{Digest, Manifest};
 use std::sync::Arc;
@@ -38,6 +39,12 @@ pub async fn submit(hub: &Arc<Hub>, r: proto::SubmitRequest) -> Result<bool, Sta
     let settings: RenderSettings =
         serde_json::from_str(&r.settings).map_err(|e| bad(format!("the settings can't be read: {e}")))?;
     settings.validate().map_err(|e| bad(e.to_string()))?;
+    if !IntegratorKind::names().any(|n| n == settings.integrator.name()) {
+        return Err(bad(format!(
+            "{} makes no picture; it only helps to choose an integrator",
+            settings.integrator.name()
+        )));
+    }
     if r.lights > MAX_LIGHTS {
         return Err(bad(format!("a scene with {} lights is too large; at most {MAX_LIGHTS} are taken", r.lights)));
     }
