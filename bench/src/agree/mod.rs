@@ -55,7 +55,7 @@ impl Budget {
                 least_spp: 256,
                 aim: 0.005,
                 samples: Limits { required: 0.02, rays: 6e6 },
-                chains: Limits { required: 0.25, rays: 6e6 },
+                chains: Limits { required: 0.25, rays: 2.4e7 },
             },
             Self::Full => Effort {
                 pilot_spp: 128,
