@@ -63,8 +63,7 @@ impl Picture<'_> {
         if kind == IntegratorKind::Path {
             let variances = pixels().map(|i| square(f64::from(image.std_error[i][channel])));
             let [x, y] = [0, 1].map(|axis| area.from[axis]..area.to[axis]);
-            let inflation = if filter.shares() { filter.inflation(0, &x) * filter.inflation(1, &y) } else { 1.0 };
-            return Estimate::pooled(mean, variances, dof, inflation);
+            return Estimate::pooled(mean, variances, dof, filter.inflation(0, &x) * filter.inflation(1, &y));
         }
         let error = if area == Area::whole(image) {
             image.blocks.image.map_or(f64::NAN, |m| m.std_error[channel])

@@ -1,5 +1,6 @@
 //! Other renderers, told by a small TOML file: a command, how to read its picture, what its time covers.
 
+use super::measure::Shot;
 use super::picture_file::{self, Format};
 use super::scene::BenchScene;
 use crate::error::process;
@@ -66,23 +67,6 @@ pub struct External {
     /// The TOML file.
     path: PathBuf,
     file: File,
-}
-
-/// What one render by another program came to.
-#[derive(Debug)]
-pub struct Outcome {
-    /// Seconds of the render itself.
-    pub seconds: f64,
-    /// Processor seconds of the render, if told.
-    pub cpu_seconds: Option<f64>,
-    /// Seconds to read the scene and start, if told.
-    pub load_s: Option<f64>,
-    /// Seconds of compilation and warming up, if told.
-    pub warmup_s: Option<f64>,
-    /// Largest resident memory of the process.
-    pub peak_mib: Option<f64>,
-    /// The picture.
-    pub pixels: Vec<[f32; 3]>,
 }
 
 /// The line that a renderer prints.
@@ -164,7 +148,7 @@ impl External {
     }
 
     /// Renders; `startup`, wall and processor seconds, is taken off.
-    pub fn render(&self, request: Request<'_>, startup: (f64, f64)) -> Result<Outcome, String> {
+    pub fn render(&self, request: Request<'_>, startup: (f64, f64)) -> Result<Shot, String> {
         let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
         let out = folder.path().join(format!("picture.{}", self.file.image.extension()));
         let (command, _scratch) = self.command(request, &out)?;
@@ -173,12 +157,12 @@ impl External {
         let cpu_seconds = process::children_cpu_seconds().zip(cpu).map(|(after, before)| after - before);
         let pixels = picture_file::read(&out, self.file.image, request.size)
             .map_err(|e| format!("{}: the picture that the command should have made: {e}", self.path.display()))?;
-        let mut outcome = Outcome { seconds, cpu_seconds, load_s: None, warmup_s: None, peak_mib, pixels };
+        let mut shot = Shot { seconds, cpu_seconds, load_s: None, warmup_s: None, peak_mib, pixels };
         match self.file.time {
             Timing::Wall => {
-                outcome.seconds = (seconds - startup.0).max(1e-3);
-                outcome.cpu_seconds = cpu_seconds.map(|s| (s - startup.1).max(1e-3));
-                outcome.load_s = Some(startup.0).filter(|s| *s > 0.0);
+                shot.seconds = (seconds - startup.0).max(1e-3);
+                shot.cpu_seconds = cpu_seconds.map(|s| (s - startup.1).max(1e-3));
+                shot.load_s = Some(startup.0).filter(|s| *s > 0.0);
             }
             Timing::Printed => {
                 let line = stdout.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or_default();
@@ -188,13 +172,13 @@ impl External {
                         self.path.display()
                     )
                 })?;
-                outcome.seconds = told.render_s;
+                shot.seconds = told.render_s;
                 // That of the command covers more than the render.
-                outcome.cpu_seconds = told.cpu_s;
-                (outcome.load_s, outcome.warmup_s) = (told.load_s, told.warmup_s);
+                shot.cpu_seconds = told.cpu_s;
+                (shot.load_s, shot.warmup_s) = (told.load_s, told.warmup_s);
             }
         }
-        Ok(outcome)
+        Ok(shot)
     }
 
     /// The command line with everything filled in.
@@ -353,8 +337,8 @@ mod tests {
         let path = folder.path().join("x.toml");
         let command = "['sh', '{here}/run.sh', '{out}', '{spp}', '{seed}']";
         std::fs::write(&path, format!("{HEAD}time = 'printed'\ncommand = {command}\n")).unwrap();
-        let outcome = External::read(&path).unwrap().render(request(&scene), (0.0, 0.0)).unwrap();
-        assert_eq!((outcome.seconds, outcome.load_s, outcome.pixels), (0.5, Some(0.25), vec![[0.0; 3]; 2]));
+        let shot = External::read(&path).unwrap().render(request(&scene), (0.0, 0.0)).unwrap();
+        assert_eq!((shot.seconds, shot.load_s, shot.pixels), (0.5, Some(0.25), vec![[0.0; 3]; 2]));
     }
 
     #[test]

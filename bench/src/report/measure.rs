@@ -115,17 +115,7 @@ impl Stage<'_> {
                     pixels: run.pixels,
                 }
             }
-            Maker::Other(e) => {
-                let o = e.render(self.request(count, seed), startup)?;
-                Shot {
-                    seconds: o.seconds,
-                    cpu_seconds: o.cpu_seconds,
-                    load_s: o.load_s,
-                    warmup_s: o.warmup_s,
-                    peak_mib: o.peak_mib,
-                    pixels: o.pixels,
-                }
-            }
+            Maker::Other(e) => e.render(self.request(count, seed), startup)?,
         };
         if self.clock == Clock::Cpu {
             let told = shot.cpu_seconds.ok_or("it does not tell its processor time, which --clock cpu needs")?;

@@ -20,12 +20,6 @@ pub struct Assumptions {
 /// The filter of pixels that share nothing.
 const PIXEL: FilterDesc = FilterDesc::Box { radius: 0.5 };
 
-/// The filter by which the pixels of one of our own pictures share samples.
-fn shared(desc: FilterDesc, p: &Picture) -> Filter {
-    let filter = Filter::new(&desc, p.width, p.height);
-    if filter.shares() { filter } else { Filter::new(&PIXEL, p.width, p.height) }
-}
-
 /// What a file knows of its error.
 pub(super) enum Errors {
     /// Standard errors of blocks (at each pixel) and of the image, from groups.
@@ -49,7 +43,7 @@ impl Errors {
             // Pixels of a path tracer share samples in a known way, if at all: hundreds of pixel errors tell a block's error better
             // than its own few groups do, whose chance of being far too small the t-test of two images underrates.
             (Some((image, kind, own)), _, Some(errors)) if kind == "path" => {
-                let filter = shared(own.unwrap_or(PIXEL), p);
+                let filter = Filter::new(&own.unwrap_or(PIXEL), p.width, p.height);
                 let name = format!("pixel errors of {} replicate groups", image.groups);
                 let dof = f64::from(image.groups) - 1.0;
                 return Some(Self::Pixels { variance: square(errors), dof, filter, name });

@@ -113,9 +113,12 @@ impl Filter {
 
     /// How much larger the variance of the mean over `pixels` is than the mean of the pixels' variances over their number, along one
     /// axis (0 = x, 1 = y), where pixels share samples: the integral of the squared sum of their filters, over the sum of the integrals of
-    /// their squares.
+    /// their squares. 1 where they share none.
     pub fn inflation(&self, axis: usize, pixels: &std::ops::Range<u32>) -> f64 {
         const STEPS: u32 = 32;
+        if !self.shares() {
+            return 1.0;
+        }
         let reach = self.radius.ceil() as u32;
         let (first, last) = (pixels.start.saturating_sub(reach), pixels.end + reach);
         let (mut joint, mut single) = (0.0, 0.0);

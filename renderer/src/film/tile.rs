@@ -41,12 +41,6 @@ impl Rect {
         }
     }
 
-    /// Whether pixel (x, y) is one of it.
-    #[inline]
-    pub fn contains(&self, x: u32, y: u32) -> bool {
-        (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
-    }
-
     /// The pixels, row by row.
     pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let r = *self;
