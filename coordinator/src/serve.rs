@@ -2,7 +2,7 @@
 
 use crate::blobs::Blobs;
 use crate::farm::{Farm, Tuning};
-use crate::grpc::{self, Guard, Token};
+use crate::grpc::{self, Guard, Linked, Token};
 use crate::hub::Hub;
 use crate::job::ActiveClock;
 use crate::merge::MergeQueue;
@@ -13,6 +13,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::net::TcpListener;
+use tokio_stream::StreamExt;
 use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
 
@@ -65,7 +66,7 @@ pub enum ServeError {
 
 /// A coordinator that listens but does not serve yet.
 pub struct Coordinator {
-    hub: Arc<Hub>,
+    pub(crate) hub: Arc<Hub>,
     listener: TcpListener,
     http: Option<TcpListener>,
     token: Option<Token>,
@@ -120,6 +121,9 @@ impl Coordinator {
     /// Serves until `end`.
     pub async fn serve(self, end: impl Future<Output = ()>) -> Result<(), ServeError> {
         let guard = Guard::new(self.token.clone());
+        let hub = self.hub.clone();
+        let incoming = TcpIncoming::from(self.listener).with_nodelay(Some(true));
+        let incoming = incoming.map(move |stream| stream.map(|s| Linked::new(s, hub.clone())));
         let server = Server::builder()
             .initial_stream_window_size(STREAM_WINDOW)
             .initial_connection_window_size(CONNECTION_WINDOW)
@@ -128,7 +132,7 @@ impl Coordinator {
             .max_concurrent_streams(256)
             .tcp_nodelay(true)
             .add_routes(grpc::routes(&self.hub, &guard))
-            .serve_with_incoming(TcpIncoming::from(self.listener).with_nodelay(Some(true)));
+            .serve_with_incoming(incoming);
         let time = self.hub.keep_time();
         let router = crate::http::router(&self.hub, self.token);
         let http = async {

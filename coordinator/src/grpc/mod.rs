@@ -4,10 +4,12 @@ mod auth;
 mod blobs;
 mod deliver;
 mod jobs;
+mod link;
 mod worker;
 
 pub use auth::{Guard, Token};
 pub use jobs::store_status;
+pub use link::Linked;
 
 use crate::hub::Hub;
 use std::sync::Arc;

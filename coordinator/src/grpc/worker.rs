@@ -1,6 +1,7 @@
 //! What workers call.
 
 use super::deliver;
+use super::link::Link;
 use crate::convert;
 use crate::hub::Hub;
 use crate::ids::WorkerId;
@@ -18,7 +19,7 @@ const HOLD: Duration = Duration::from_secs(2);
 /// The service.
 pub struct Workers(pub Arc<Hub>);
 
-/// Notices when a waiting call is dropped because its connection was cut.
+/// Notices when a waiting call is dropped: its connection was cut, or a proxy on the way says so of the one behind it.
 struct Watch<'a> {
     hub: &'a Hub,
     worker: WorkerId,
@@ -40,7 +41,8 @@ impl WorkerService for Workers {
         &self,
         request: Request<proto::SynchronizeRequest>,
     ) -> Result<Response<proto::SynchronizeResponse>, Status> {
-        let address = request.remote_addr().map_or_else(String::new, |a| a.to_string());
+        let link = request.extensions().get::<Link>().cloned();
+        let address = link.as_ref().and_then(|l| l.address).map_or_else(String::new, |a| a.to_string());
         let request = request.into_inner();
         self.check_version(&request)?;
         let report = convert::report(&request, address)?;
@@ -49,6 +51,9 @@ impl WorkerService for Workers {
         let overtaken = || Status::aborted("a later call of this worker overtook this one");
         if !self.0.with(|farm, now| farm.report(report, now)) {
             return Err(overtaken());
+        }
+        if let Some(link) = link {
+            link.note(worker, sequence);
         }
         if leaves {
             return Ok(Response::new(Default::default()));
