@@ -30,6 +30,9 @@ pub struct RenderArgs {
     /// Stop when the upper 95 % bound of the relative error is below this, such as 0.02
     #[arg(long, value_name = "X", value_parser = positive)]
     pub target_error: Option<f64>,
+    /// Give noisy tiles more samples and quiet ones fewer (path) [default: true with --target-error]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub adaptive: Option<bool>,
     /// Width and height in pixels, such as 640x480
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -51,6 +54,7 @@ impl RenderArgs {
             mmlt: self.mmlt,
             time_s: self.time,
             target_error: self.target_error,
+            adaptive: self.adaptive,
             size: self.size,
             max_depth: self.max_depth,
             seed: self.seed,

@@ -33,6 +33,7 @@ fn groups(count: u32) -> (Vec<GroupFilm>, Vec<AovSum>) {
             WIDTH,
             HEIGHT,
             &TileSums { rect, covered: rect, samples: 2, sums, weights: vec![2.0; rect.area()], aovs: Vec::new() },
+            0,
         );
         films.push(film);
     }

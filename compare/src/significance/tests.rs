@@ -37,6 +37,7 @@ fn with_groups(seed: u64, scale: f32) -> Picture {
             SIDE,
             SIDE,
             &TileSums { rect, covered: rect, samples: 1, sums, weights: vec![1.0; rect.area()], aovs: Vec::new() },
+            0,
         );
         film
     };

@@ -16,6 +16,7 @@ fn spec() -> JobSpec {
         rr_depth: 5,
         seed: 1,
         replicates: 2,
+        adaptive: false,
         mmlt: Default::default(),
     };
     JobSpec {

@@ -1,4 +1,4 @@
-use super::{SplatSums, TileSums};
+use super::{SplatSums, TileGrid, TileSums, TiledFilm};
 
 /// The film of one replicate group: a complete, independent estimate of the image.
 ///
@@ -23,6 +23,8 @@ pub enum GroupFilm {
         /// Without splats the group is not complete, and counts for nothing.
         awaits_splats: bool,
     },
+    /// Still growing, with more samples of some tiles than of others.
+    Tiled(TiledFilm),
     /// Complete.
     Closed {
         /// Mean radiance.
@@ -56,8 +58,11 @@ impl GroupFilm {
         }
     }
 
-    /// Adds a tile; the tile must lie on the film of `width * height` pixels.
-    pub fn add_tile(&mut self, width: u32, height: u32, tile: &TileSums) {
+    /// Adds a tile, for which `rays` rays were traced; the tile must lie on the film of `width * height` pixels.
+    pub fn add_tile(&mut self, width: u32, height: u32, tile: &TileSums, rays: u64) {
+        if let Self::Tiled(film) = self {
+            return film.add(tile, rays);
+        }
         self.open(width as usize * height as usize, true, false);
         let Self::Open { sums, weights, samples, .. } = self else { return };
         for (((x, y), v), w) in tile.covered.pixels().zip(&tile.sums).zip(&tile.weights) {
@@ -119,11 +124,13 @@ impl GroupFilm {
         }
     }
 
-    /// The mean of pixel `i` and its weight (samples, or light paths per pixel); weight 0 where nothing was sampled.
+    /// The mean of pixel `i` and its weight among the groups (samples, or light paths per pixel; where samples go by what was found, 1
+    /// for all); weight 0 where nothing was sampled.
     pub fn pixel(&self, i: usize) -> ([f64; 3], f64) {
         match self {
             Self::Empty => ([0.0; 3], 0.0),
             Self::Closed { mean, weight } => (mean[i].map(f64::from), *weight),
+            Self::Tiled(film) => film.pixel(i).map_or(([0.0; 3], 0.0), |mean| (mean, 1.0)),
             Self::Open { awaits_splats: true, .. } => ([0.0; 3], 0.0),
             Self::Open { sums, weights, samples, splats, splat_weight, .. } => {
                 let n = samples.get(i).copied().map_or(0.0, f64::from);
@@ -140,6 +147,11 @@ impl GroupFilm {
                 (mean, if samples.is_empty() { splat_weight / splats.len() as f64 } else { n })
             }
         }
+    }
+
+    /// Samples of pixel `i` (or light paths per pixel).
+    pub fn samples(&self, i: usize) -> f64 {
+        if let Self::Tiled(film) = self { f64::from(film.samples_of(i)) } else { self.pixel(i).1 }
     }
 
     /// What splats contribute to the mean of pixel `i`, while the group is open.
@@ -184,11 +196,20 @@ impl GroupFilm {
                 array(out, mean);
                 out.extend(weight.to_le_bytes());
             }
+            Self::Tiled(film) => {
+                let (reach, samples, rays, sums) = film.parts();
+                out.push(3);
+                out.extend(reach.to_le_bytes());
+                array(out, samples);
+                array(out, rays);
+                array(out, sums);
+            }
         }
     }
 
-    /// Takes a group of a film of `pixels` pixels off the front of `bytes`; `None` when they are not one.
-    pub fn load(bytes: &mut &[u8], pixels: usize) -> Option<Self> {
+    /// Takes a group of a film of `width * height` pixels off the front of `bytes`; `None` when they are not one.
+    pub fn load(bytes: &mut &[u8], width: u32, height: u32) -> Option<Self> {
+        let pixels = width as usize * height as usize;
         fn take<'a>(bytes: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
             let (head, tail) = bytes.split_at_checked(n)?;
             *bytes = tail;
@@ -197,25 +218,34 @@ impl GroupFilm {
         fn word(bytes: &mut &[u8]) -> Option<u64> {
             take(bytes, 8)?.try_into().ok().map(u64::from_le_bytes)
         }
-        fn array<T: bytemuck::AnyBitPattern>(bytes: &mut &[u8], pixels: usize) -> Option<Vec<T>> {
-            let n = usize::try_from(word(bytes)?).ok().filter(|n| *n == 0 || *n == pixels)?;
+        fn array<T: bytemuck::AnyBitPattern>(bytes: &mut &[u8], fits: impl Fn(usize) -> bool) -> Option<Vec<T>> {
+            let n = usize::try_from(word(bytes)?).ok().filter(|n| fits(*n))?;
             let raw = take(bytes, n.checked_mul(size_of::<T>())?)?;
             Some(raw.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
         }
+        let film = |n: usize| n == 0 || n == pixels;
         Some(match take(bytes, 1)? {
             [0] => Self::Empty,
             [1] => Self::Open {
-                sums: array(bytes, pixels)?,
-                weights: array(bytes, pixels)?,
-                samples: array(bytes, pixels)?,
-                splats: array(bytes, pixels)?,
+                sums: array(bytes, film)?,
+                weights: array(bytes, film)?,
+                samples: array(bytes, film)?,
+                splats: array(bytes, film)?,
                 splat_weight: f64::from_bits(word(bytes)?),
                 awaits_splats: take(bytes, 1)? == [1],
             },
             [2] => Self::Closed {
-                mean: array(bytes, pixels).filter(|m: &Vec<_>| m.len() == pixels)?,
+                mean: array(bytes, film).filter(|m: &Vec<_>| m.len() == pixels)?,
                 weight: f64::from_bits(word(bytes)?),
             },
+            [3] => {
+                let reach = take(bytes, 4)?.try_into().ok().map(u32::from_le_bytes)?;
+                let grid = TileGrid::of_film(width, height);
+                let tiles = |n: usize| n == grid.tiles() as usize;
+                let (samples, rays) = (array(bytes, tiles)?, array(bytes, tiles)?);
+                // The sums are checked with the grid, and the bytes are there or not.
+                Self::Tiled(TiledFilm::from_parts(grid, reach, samples, rays, array(bytes, |_| true)?)?)
+            }
             _ => return None,
         })
     }

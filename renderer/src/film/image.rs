@@ -50,7 +50,7 @@ impl MergedImage {
     /// `aovs` are sums over the samples of group 0, or empty.
     pub fn from_groups(width: u32, height: u32, groups: &[GroupFilm], aovs: &[AovSum], counters: Counters) -> Self {
         let pixels = width as usize * height as usize;
-        let samples = |i: usize| groups.first().map_or(0.0, |g| g.pixel(i).1);
+        let samples = |i: usize| groups.first().map_or(0.0, |g| g.samples(i));
         let aovs = aovs.iter().enumerate().map(|(i, sum)| sum.average(samples(i))).collect();
         let mut image = Self {
             width,
@@ -69,6 +69,7 @@ impl MergedImage {
         for i in 0..pixels {
             values.clear();
             values.extend(groups.iter().enumerate().map(|(g, f)| (g, f.pixel(i))).filter(|(_, (_, n))| *n > 0.0));
+            image.samples.push(groups.iter().map(|g| g.samples(i)).sum::<f64>() as f32);
             image.push_pixel(&values, &mut scatter);
             values.iter().for_each(|(g, (v, n))| blocks.add(i, *g, v, *n));
         }
@@ -79,7 +80,6 @@ impl MergedImage {
 
     fn push_pixel(&mut self, values: &[(usize, ([f64; 3], f64))], scatter: &mut GroupScatter) {
         let n: f64 = values.iter().map(|v| v.1.1).sum();
-        self.samples.push(n as f32);
         if values.is_empty() {
             self.mean.push([0.0; 3]);
             self.std_error.push([f32::NAN; 3]);

@@ -8,6 +8,7 @@ mod image;
 pub mod png;
 mod splat;
 mod tile;
+mod tiled;
 
 pub use crate::path::Counters;
 pub use blocks::{BlockErrors, ChannelMeans, ERROR_BLOCK};
@@ -16,3 +17,4 @@ pub use group::GroupFilm;
 pub use image::{ErrorSummary, MergedImage};
 pub use splat::{BLOCK, SplatSums};
 pub use tile::{Aov, AovSum, Rect, TileSums};
+pub use tiled::{TileGrid, TiledFilm};

@@ -1,5 +1,6 @@
 //! A job: settings, passes, units, results and their merge. The same code runs in `lightfarm render` and on the farm.
 
+mod adaptive;
 mod auto;
 mod bytes;
 mod codec;
@@ -8,6 +9,7 @@ mod local;
 mod merger;
 mod metropolis;
 mod plan;
+mod planner;
 mod rendering;
 mod run;
 mod settings;
@@ -17,7 +19,8 @@ pub use auto::{Choice, Outcome};
 pub use codec::DecodeError;
 pub use local::{LocalEvent, LocalOptions, LocalOutcome, render_local};
 pub use merger::Merger;
-pub use plan::{GroupRange, Learned, Part, PassPlan, Planner, Sampling};
+pub use plan::{Dealing, GroupRange, Part, PassPlan, Sampling};
+pub use planner::{Learned, Planner};
 pub use rendering::FoldError;
 pub use run::{Stop, UnitError, render_strategies, run_unit};
 pub use settings::{Budget, RenderOptions, RenderSettings, SettingsError};

@@ -1,8 +1,6 @@
-use super::metropolis;
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind};
-use crate::film::Rect;
-use crate::integrator::IntegratorKind;
+use crate::film::{Rect, TileGrid};
 use crate::integrator::mmlt::{ChainConstants, ChainStart};
 use crate::scene::bundle::Digest;
 use serde::{Deserialize, Serialize};
@@ -15,33 +13,6 @@ const SAMPLE_CHUNK: u32 = 256;
 const UNIT_BOOTSTRAP: u32 = 1 << 12;
 /// Mutations that a unit of chains aims at.
 const UNIT_MUTATIONS: u64 = 1 << 18;
-/// Most samples per pixel of a job.
-const MAX_SPP: u32 = 1 << 24;
-/// Samples that the first passes of a job aim at that time or error ends: seconds of work on few cores.
-const PASS_SAMPLES: u64 = 1 << 19;
-/// Samples per pixel (mutations) of each group before its error is believed.
-pub const CHECKPOINT_SAMPLES: u32 = 8;
-
-/// Samples per pixel (mutations) of the pass after `done`, of which `left` are left, in a job that time or error ends.
-///
-/// A tenth of what is done, so that passes stay below a tenth of a time budget, and checkpoints are declared before anything is
-/// measured. On large films the first passes have fewer samples than there are groups, which get theirs in turn (see [`dealt`]): a
-/// sample for each of them could take minutes. Above their number, all groups get the same.
-pub fn pass_size(settings: &RenderSettings, done: u32, left: u32) -> u32 {
-    let g = settings.replicates;
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
-    // At most the number of groups, which is small.
-    let first = (PASS_SAMPLES / pixels).clamp(1, u64::from(g)) as u32;
-    let least = if done < CHECKPOINT_SAMPLES * g { first } else { g };
-    let size = (done / 10).max(least).min(left);
-    if size > g { size / g * g } else { size }
-}
-
-/// How many of `total` samples per pixel fall to a group.
-pub fn dealt(settings: &RenderSettings, total: u32, group: u32) -> u32 {
-    let g = settings.replicates;
-    total / g + u32::from(group < total % g)
-}
 
 /// The samples of one replicate group in one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,6 +38,45 @@ pub enum Sampling {
     SplattingTiles,
     /// Light paths over the whole film.
     Paths,
+}
+
+/// How a pass deals samples to tiles, in a job that gives noisy tiles more of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dealing {
+    /// The tiles: units are these.
+    pub grid: TileGrid,
+    /// First sample index of the pass and one past the last, of each tile: for groups of even number, and for those of odd number. Empty
+    /// where every tile gets what its [`GroupRange`] says.
+    pub ranges: Vec<Vec<[u32; 2]>>,
+}
+
+impl Dealing {
+    /// Samples of each tile in one group.
+    fn tiles(&self, g: &GroupRange) -> impl Iterator<Item = (u32, u32, u32)> + use<'_> {
+        let (start, end) = (g.start, g.end);
+        let ranges = self.ranges.get(g.replicate as usize % 2);
+        let range = move |tile: u32| ranges.and_then(|r| r.get(tile as usize)).map_or((start, end), |r| (r[0], r[1]));
+        (0..self.grid.tiles()).map(move |tile| (tile, range(tile).0, range(tile).1))
+    }
+
+    /// Units of one group.
+    fn units(&self, g: &GroupRange) -> u64 {
+        self.tiles(g).map(|(_, start, end)| u64::from((end - start).div_ceil(SAMPLE_CHUNK))).sum()
+    }
+
+    /// Tile and samples of unit `i` of one group.
+    fn unit(&self, g: &GroupRange, mut i: u64) -> Option<(Rect, u32, u32)> {
+        for (tile, start, end) in self.tiles(g) {
+            let chunks = u64::from((end - start).div_ceil(SAMPLE_CHUNK));
+            if i < chunks {
+                let start = start + i as u32 * SAMPLE_CHUNK;
+                return Some((self.grid.rect(tile), start, (start + SAMPLE_CHUNK).min(end)));
+            }
+            i -= chunks;
+        }
+        None
+    }
 }
 
 /// A part of a pass; its units follow from it by arithmetic.
@@ -122,6 +132,8 @@ pub struct PassPlan {
     pub reach: u32,
     /// What units of samples are.
     pub sampling: Sampling,
+    /// How its samples are dealt to tiles; `None` = to all alike.
+    pub dealing: Option<Dealing>,
     /// What is done, in the order of the units.
     pub parts: Vec<Part>,
     /// Plan constant: selection weights of the lights, learned from earlier passes; empty = by power.
@@ -215,6 +227,7 @@ impl PassPlan {
             Part::Samples(g) if self.sampling == Sampling::Paths => {
                 (u64::from(g.end - g.start) * self.pixels()).div_ceil(self.unit_samples())
             }
+            Part::Samples(g) if let Some(dealing) = &self.dealing => dealing.units(g),
             Part::Samples(g) => {
                 let side = self.tile_side();
                 u64::from(Self::sample_chunks(g))
@@ -253,6 +266,11 @@ impl PassPlan {
                 let (first, last) = (u64::from(g.start) * self.pixels(), u64::from(g.end) * self.pixels());
                 let start = first + i * self.unit_samples();
                 UnitKind::Paths { start, end: (start + self.unit_samples()).min(last) }
+            }
+            Part::Samples(g) if let Some(dealing) = &self.dealing => {
+                // Its callers have counted the units.
+                let (rect, start, end) = dealing.unit(g, i).unwrap_or((dealing.grid.rect(0), g.start, g.start));
+                UnitKind::Tile { rect, covered: rect.grown(self.reach, self.width, self.height), start, end }
             }
             Part::Samples(g) => {
                 let side = self.tile_side();
@@ -293,125 +311,4 @@ impl PassPlan {
     pub fn covers_film(&self, id: u32) -> bool {
         matches!(self.ends_part(id), Some(Part::Samples(_)))
     }
-}
-
-/// Makes the passes of a job, one after the other.
-#[derive(Clone, Debug)]
-pub struct Planner {
-    settings: RenderSettings,
-}
-
-impl Planner {
-    /// For settings that were validated.
-    pub fn new(settings: RenderSettings) -> Self {
-        Self { settings }
-    }
-
-    /// The first pass: small, so that there is a preview (and a pilot) soon.
-    ///
-    /// A budget in samples is worked off group after group, so that few films are open at once. Its first pass is one sample per pixel
-    /// of the first group; a tracer from the lights, which learns from its pilot, does an eighth of its groups first.
-    pub fn first(&self) -> PassPlan {
-        if self.settings.integrator == IntegratorKind::Mmlt {
-            return metropolis::pilot(&self.settings);
-        }
-        let Some(spp) = self.sample_budget() else {
-            return self.pass(0, 0, pass_size(&self.settings, 0, MAX_SPP), Learned::default());
-        };
-        let groups = self.shares(spp);
-        let first = if self.learns_first() {
-            groups[..(groups.len() / 8).max(1)].to_vec()
-        } else if groups[0].end > 1 {
-            vec![GroupRange { end: 1, closes: false, ..groups[0] }]
-        } else {
-            groups.clone()
-        };
-        let last = first == groups;
-        self.plan(0, first, Learned::default(), last)
-    }
-
-    /// The pass after one that ended at `done` samples per pixel in all; `None` when the sample budget is used up. Not for Metropolis
-    /// jobs, which `metropolis` plans.
-    pub fn next(&self, pass: u32, done: u32, learned: Learned) -> Option<PassPlan> {
-        if let Some(spp) = self.sample_budget() {
-            let groups = self.shares(spp);
-            let rest = if self.learns_first() {
-                groups[(groups.len() / 8).max(1)..].to_vec()
-            } else {
-                let mut rest = groups;
-                rest[0].start = 1;
-                rest
-            };
-            return (pass == 1).then(|| self.plan(pass, rest, learned, true));
-        }
-        let left = self.settings.budget.spp.map_or(MAX_SPP, |n| n.min(MAX_SPP)).saturating_sub(done);
-        let size = pass_size(&self.settings, done, left);
-        (size > 0).then(|| self.pass(pass, done, size, learned))
-    }
-
-    /// The samples per pixel of a job that nothing but their number ends.
-    fn sample_budget(&self) -> Option<u32> {
-        let b = &self.settings.budget;
-        b.spp.filter(|_| b.time_s.is_none() && b.target_error.is_none())
-    }
-
-    /// Whether the first pass is a pilot of whole groups.
-    fn learns_first(&self) -> bool {
-        self.settings.integrator == IntegratorKind::Light
-    }
-
-    fn sampling(&self) -> Sampling {
-        match self.settings.integrator {
-            IntegratorKind::Light => Sampling::Paths,
-            IntegratorKind::Bdpt | IntegratorKind::Moments => Sampling::SplattingTiles,
-            IntegratorKind::Path | IntegratorKind::Mmlt | IntegratorKind::Auto => Sampling::Tiles,
-        }
-    }
-
-    /// What each group renders of a whole sample budget.
-    fn shares(&self, spp: u32) -> Vec<GroupRange> {
-        let g = self.settings.replicates;
-        (0..g)
-            .map(|r| GroupRange { replicate: r, start: 0, end: spp / g + u32::from(r < spp % g), closes: true })
-            .filter(|r| r.end > 0)
-            .collect()
-    }
-
-    /// Samples `from .. from + size` of the job, dealt to the groups as evenly as can be.
-    fn pass(&self, pass: u32, from: u32, size: u32, learned: Learned) -> PassPlan {
-        let upto = |total: u32, r: u32| dealt(&self.settings, total, r);
-        let groups = (0..self.settings.replicates)
-            .map(|r| GroupRange { replicate: r, start: upto(from, r), end: upto(from + size, r), closes: false })
-            .filter(|r| r.end > r.start)
-            .collect();
-        let last = self.settings.budget.spp.is_some_and(|n| from + size >= n);
-        self.plan(pass, groups, learned, last)
-    }
-
-    fn plan(&self, pass: u32, groups: Vec<GroupRange>, learned: Learned, last: bool) -> PassPlan {
-        PassPlan {
-            pass,
-            width: self.settings.width,
-            height: self.settings.height,
-            reach: self.settings.reach(),
-            sampling: self.sampling(),
-            parts: groups.into_iter().map(Part::Samples).collect(),
-            light_weights: learned.light_weights,
-            threshold: learned.threshold,
-            chains: None,
-            chain_weight: 0,
-            last,
-            first: 0,
-            settings: None,
-        }
-    }
-}
-
-/// What earlier passes teach the next.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Learned {
-    /// Selection weights of the lights; empty = by power.
-    pub light_weights: Vec<f32>,
-    /// Contributions of connections below this are tested for visibility by chance only.
-    pub threshold: f32,
 }

@@ -1,6 +1,8 @@
+use super::adaptive;
 use super::bytes::Reader;
 use super::metropolis::Metropolis;
-use super::plan::{CHECKPOINT_SAMPLES, Learned, Part, PassPlan, Planner, Sampling};
+use super::plan::{Part, PassPlan, Sampling};
+use super::planner::{CHECKPOINT_SAMPLES, Learned, Planner};
 use super::settings::RenderSettings;
 use super::unit::{UnitKind, UnitResult};
 use crate::film::{AovSum, Counters, GroupFilm, MergedImage, SplatSums};
@@ -75,7 +77,8 @@ impl Rendering {
     pub fn new(settings: RenderSettings) -> Self {
         let planner = Planner::new(settings.clone());
         let plan = planner.first();
-        let groups = vec![GroupFilm::Empty; settings.replicates as usize];
+        let uniform = || vec![GroupFilm::Empty; settings.replicates as usize];
+        let groups = adaptive::films(&settings).unwrap_or_else(uniform);
         Self {
             settings,
             planner,
@@ -159,7 +162,7 @@ impl Rendering {
                     && splats.is_some() == (self.plan.sampling == Sampling::SplattingTiles)
                     && splats.as_ref().is_none_or(fits) =>
             {
-                group.add_tile(w, h, tile);
+                group.add_tile(w, h, tile, result.counters.rays);
                 if let Some(splats) = splats {
                     group.add_splats(splats, rect.area() as u64 * u64::from(tile.samples));
                 }
@@ -233,7 +236,12 @@ impl Rendering {
         if self.settings.integrator == IntegratorKind::Mmlt {
             return self.metropolis.next(&self.settings, &self.plan, self.done_spp, &self.groups);
         }
-        let learned = Learned { light_weights: self.learned_weights(), threshold: self.learned_threshold() };
+        let share = self.planner.size(self.done_spp) / self.settings.replicates;
+        let learned = Learned {
+            light_weights: self.learned_weights(),
+            threshold: self.learned_threshold(),
+            ranges: adaptive::deal(&self.settings, &self.groups, self.done_spp, share),
+        };
         self.planner.next(self.plan.pass + 1, self.done_spp, learned)
     }
 
@@ -368,14 +376,15 @@ impl Rendering {
         let head_len = r.length()?;
         let head: Head = serde_json::from_slice(r.take(head_len)?).ok()?;
         head.settings.validate().ok()?;
-        let pixels = head.settings.width as usize * head.settings.height as usize;
+        let (w, h) = (head.settings.width, head.settings.height);
+        let pixels = w as usize * h as usize;
         let aovs = r.length()?;
         let aovs = r.take(aovs.checked_mul(size_of::<AovSum>())?)?;
         let aovs: Vec<AovSum> = aovs.chunks_exact(size_of::<AovSum>()).map(bytemuck::pod_read_unaligned).collect();
         if !aovs.is_empty() && aovs.len() != pixels {
             return None;
         }
-        let groups = (0..head.settings.replicates).map(|_| GroupFilm::load(&mut r.0, pixels)).collect::<Option<_>>()?;
+        let groups = (0..head.settings.replicates).map(|_| GroupFilm::load(&mut r.0, w, h)).collect::<Option<_>>()?;
         let metropolis = Metropolis::load(&mut r.0, pixels)?;
         Some(Self {
             planner: Planner::new(head.settings.clone()),

@@ -43,6 +43,8 @@ pub struct RenderSettings {
     pub seed: u64,
     /// Independent replicate groups.
     pub replicates: u32,
+    /// Whether `path` gives noisy tiles more samples.
+    pub adaptive: bool,
     /// How chains run.
     pub mmlt: MmltOptions,
 }
@@ -62,6 +64,8 @@ pub struct RenderOptions {
     pub time_s: Option<f64>,
     /// `--target-error`
     pub target_error: Option<f64>,
+    /// `--adaptive`
+    pub adaptive: Option<bool>,
     /// `--size`
     pub size: Option<(u32, u32)>,
     /// `--max-depth`
@@ -85,6 +89,12 @@ impl RenderOptions {
             let name = integrator.name();
             let would = if integrator == IntegratorKind::Auto { "chooses" } else { "would render" };
             return Err(format!("--mmlt is for mmlt, but {name} {would}; leave it out, or give --integrator mmlt"));
+        }
+        if self.adaptive == Some(true) && !matches!(integrator, IntegratorKind::Path | IntegratorKind::Auto) {
+            let name = integrator.name();
+            return Err(format!(
+                "--adaptive is for path, but {name} would render; leave it out, or give --integrator path"
+            ));
         }
         self.mmlt.map_or(Ok(()), |o| o.validate())?;
         self.size.map_or(Ok(()), |(width, height)| check_size(width, height))
@@ -131,10 +141,16 @@ impl RenderSettings {
             rr_depth: scene.rr_depth.unwrap_or(5),
             seed: options.seed.or(scene.seed).unwrap_or(0),
             replicates: groups(integrator, &budget),
+            adaptive: options.adaptive.unwrap_or(budget.target_error.is_some()),
             mmlt: options.mmlt.unwrap_or_default(),
         };
         settings.validate()?;
         Ok(settings)
+    }
+
+    /// Whether samples go to the tiles that need them; only those of `path` do.
+    pub fn adapts(&self) -> bool {
+        self.adaptive && self.integrator == IntegratorKind::Path
     }
 
     /// Pixels beyond its own for which a sample counts.

@@ -95,7 +95,7 @@ fn sums_of_a_group(probe: &mut Probe) {
         let sum = (0.1 + 0.01 * f64::from(s.next_1d())) * f64::from(PER_UNIT);
         let sums = vec![Rgb::splat(sum as f32)];
         exact.add(sum as f32);
-        group.add_tile(1, 1, &tile(rect, PER_UNIT, sums, Vec::new()));
+        group.add_tile(1, 1, &tile(rect, PER_UNIT, sums, Vec::new()), 0);
     }
     let (mean, n) = group.pixel(0);
     let truth = exact.value() / f64::from(units) / f64::from(PER_UNIT);

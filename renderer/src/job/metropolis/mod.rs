@@ -16,7 +16,8 @@ mod state;
 
 use crate::film::{GroupFilm, SplatSums};
 use crate::integrator::mmlt::{ChainConstants, ChainStart, Depth, TARGET_CELL};
-use crate::job::plan::{GroupRange, Part, PassPlan, Sampling, dealt, pass_size};
+use crate::job::plan::{GroupRange, Part, PassPlan, Sampling};
+use crate::job::planner::{dealt, pass_size};
 use crate::job::settings::RenderSettings;
 use crate::job::unit::{Unit, UnitKind, UnitResult};
 use crate::sampling::{IndependentSampler, Sampler};
@@ -127,6 +128,7 @@ fn plan(
         height: settings.height,
         reach: settings.reach(),
         sampling: Sampling::Tiles,
+        dealing: None,
         parts,
         light_weights: Vec::new(),
         threshold: 0.0,
