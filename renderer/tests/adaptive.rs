@@ -114,7 +114,8 @@ fn the_expectation_is_the_image_and_the_error_is_true() {
         for i in 0..image.mean.len() {
             sum[region(i)] += f64::from(image.mean[i][1]);
             count[region(i)] += 1.0;
-            told[region(i)] += f64::from(image.std_error[i][1]).powi(2);
+            let error = f64::from(image.std_error[i][1]);
+            told[region(i)] += error * error;
         }
         (0..3).for_each(|r| means[r].push(sum[r] / count[r]));
     }

@@ -30,13 +30,18 @@ pub fn deal(settings: &RenderSettings, films: &[GroupFilm], done: u32, share: u3
     if g < 4 || done < PILOT * g || !done.is_multiple_of(g) {
         return None;
     }
-    let half = |odd: usize| -> Vec<&TiledFilm> {
-        let tiled = |f| if let &GroupFilm::Tiled(ref t) = f { Some(t) } else { None };
-        films.iter().skip(odd).step_by(2).filter_map(tiled).collect()
-    };
-    let (even, odd) = (half(0), half(1));
+    let (even, odd) = (half(films, 0), half(films, 1));
     let total = done / g + share;
     Some(vec![ranges(even.first()?, &odd, total), ranges(odd.first()?, &even, total)])
+}
+
+/// The films of the groups of even or of odd number.
+fn half(films: &[GroupFilm], odd: usize) -> Vec<&TiledFilm> {
+    let tiled = films.iter().skip(odd).step_by(2).map(|f| match f {
+        GroupFilm::Tiled(t) => Some(t),
+        _ => None,
+    });
+    tiled.flatten().collect()
 }
 
 /// First sample and one past the last, for each tile of groups like `own`, by the noise of `others`; `total` samples per pixel afterwards.
