@@ -18,7 +18,7 @@ use renderer::sampling::warp;
 use renderer::scene::Scene;
 use renderer::scene::bundle::DiskSource;
 use renderer::spectrum::Rgb;
-use renderer::texture::{Filter, Image, Texture, UvTransform, Wrap};
+use renderer::texture::{Filter, Image, Texels, Texture, UvTransform, Wrap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -105,7 +105,7 @@ fn bsdf_sample(bencher: Bencher, name: &str) {
 fn texture_eval(bencher: Bencher, filter: &Filter) {
     let mut random = Random(5);
     let texels = (0..1024 * 1024).map(|_| Rgb::splat(random.next())).collect();
-    let image = Arc::new(Image { width: 1024, height: 1024, texels, alpha: Vec::new() });
+    let image = Arc::new(Image { width: 1024, height: 1024, texels: Texels::Float(texels) });
     let uv = UvTransform::IDENTITY;
     let texture = Texture::Image { image, wrap: [Wrap::Repeat; 2], filter: *filter, uv, scale: Rgb::ONE };
     let points: Vec<Vec2> = (0..ITEMS).map(|_| Vec2::new(random.next(), random.next()) * 4.0).collect();

@@ -8,6 +8,9 @@ use crate::texture::Image;
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
+/// Most texels of a picture (16384 x 8192): a table of 8 bytes for each is kept beside it.
+pub(super) const MAX_TEXELS: usize = 1 << 27;
+
 /// An equirectangular picture of the sky, interpolated bilinearly: it wraps round, its first and last row go on to the poles.
 /// Negative texels count as zero.
 ///
@@ -45,6 +48,9 @@ impl EnvironmentLight {
         if width == 0 || height == 0 || width.checked_mul(height) != Some(image.texels.len()) {
             return Err(LightError::Picture);
         }
+        if image.texels.len() > MAX_TEXELS {
+            return Err(LightError::Large);
+        }
         if image.texels.iter().any(|t| !t.to_array().iter().all(|c| c.is_finite())) {
             return Err(LightError::Emission);
         }
@@ -55,8 +61,9 @@ impl EnvironmentLight {
         // Tabulate luminance times sine by rows.
         let step = std::f64::consts::PI / height as f64;
         let sines: Vec<f32> = (0..height).map(|y| sin64(step * (y as f64 + 0.5)) as f32).collect();
-        let luminances = |row: &[Rgb]| row.iter().map(|t| (positive(*t) * scale).luminance()).collect::<Vec<f32>>();
-        let columns: Vec<_> = image.texels.chunks_exact(width).map(|row| Discrete::new(&luminances(row))).collect();
+        let luminance = |x, y| (positive(image.texel(x, y)) * scale).luminance();
+        let luminances = |y| (0..image.width).map(|x| luminance(x, y)).collect::<Vec<f32>>();
+        let columns: Vec<_> = (0..image.height).map(|y| Discrete::new(&luminances(y))).collect();
         let sums: Vec<f32> =
             columns.iter().zip(&sines).map(|(c, s)| c.as_ref().map_or(0.0, |c| c.total() as f32) * s).collect();
         let Some(rows) = Discrete::new(&sums) else { return Ok(None) };
@@ -85,8 +92,8 @@ impl EnvironmentLight {
     fn lookup(&self, taps: &Taps) -> (Rgb, f32) {
         let mut radiance = Rgb::ZERO;
         let mut density = 0.0;
-        for k in 0..4 {
-            let texel = positive(self.image.texels[taps.index[k]]) * self.scale * taps.weight[k];
+        for (k, texel) in self.image.texels.get(taps.index).into_iter().enumerate() {
+            let texel = positive(texel) * self.scale * taps.weight[k];
             radiance += texel;
             density += texel.luminance() * self.sines[taps.row[k]];
         }
@@ -162,10 +169,10 @@ fn integral(image: &Image) -> Rgb {
         if y == 0 || y == height - 1 { inner + 1.0 - 2.0 * s / h } else { inner }
     };
     let mut sum = [0.0f64; 3];
-    for (y, row) in image.texels.chunks_exact(width).enumerate() {
-        let weight = row_integral(y) * 2.0 * std::f64::consts::PI / width as f64;
-        for texel in row {
-            for (s, c) in sum.iter_mut().zip(positive(*texel).to_array()) {
+    for y in 0..image.height {
+        let weight = row_integral(y as usize) * 2.0 * std::f64::consts::PI / width as f64;
+        for x in 0..image.width {
+            for (s, c) in sum.iter_mut().zip(positive(image.texel(x, y)).to_array()) {
                 *s += weight * f64::from(c);
             }
         }

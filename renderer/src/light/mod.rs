@@ -52,6 +52,9 @@ pub enum LightError {
     /// The environment's to_world is singular.
     #[error("its transform is singular")]
     Transform,
+    /// The environment's picture has so many texels that the tables to sample it don't fit.
+    #[error("its picture has more than {} texels, too many to sample", environment::MAX_TEXELS)]
+    Large,
     /// The environment's picture is empty or its length is not width times height.
     #[error("its picture has no texels, or not width times height of them")]
     Picture,

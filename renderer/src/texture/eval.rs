@@ -50,7 +50,14 @@ impl Image {
     /// The texel in column `x` of row `y`.
     #[inline]
     pub fn texel(&self, x: u32, y: u32) -> Rgb {
-        self.texels[y as usize * self.width as usize + x as usize]
+        let [texel] = self.texels.get([self.index(x, y)]);
+        texel
+    }
+
+    /// Where the texel in column `x` of row `y` is.
+    #[inline]
+    fn index(&self, x: u32, y: u32) -> usize {
+        y as usize * self.width as usize + x as usize
     }
 
     /// The texel whose square holds `uv`.
@@ -62,8 +69,11 @@ impl Image {
     fn bilinear(&self, uv: Vec2, wrap: [Wrap; 2]) -> Rgb {
         let ([x0, x1], fx) = texel_pair(uv.x, self.width, wrap[0]);
         let ([y0, y1], fy) = texel_pair(uv.y, self.height, wrap[1]);
-        let row = |y| self.texel(x0, y) * (1.0 - fx) + self.texel(x1, y) * fx;
-        row(y0) * (1.0 - fy) + row(y1) * fy
+        // All at once: how texels are kept is told only once.
+        let [a, b, c, d] =
+            self.texels.get([self.index(x0, y0), self.index(x1, y0), self.index(x0, y1), self.index(x1, y1)]);
+        let row = |left: Rgb, right: Rgb| left * (1.0 - fx) + right * fx;
+        row(a, b) * (1.0 - fy) + row(c, d) * fy
     }
 }
 
@@ -116,7 +126,7 @@ fn texel_pair(x: f32, size: u32, wrap: Wrap) -> ([u32; 2], f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::texture::{TextureId, UvTransform};
+    use crate::texture::{Texels, TextureId, UvTransform};
     use std::sync::Arc;
 
     /// A row of grey texels.
@@ -124,8 +134,7 @@ mod tests {
         let image = Image {
             width: values.len() as u32,
             height: 1,
-            texels: values.iter().map(|v| Rgb::splat(*v)).collect(),
-            alpha: Vec::new(),
+            texels: Texels::Float(values.iter().map(|v| Rgb::splat(*v)).collect()),
         };
         let (image, wrap) = (Arc::new(image), [wrap; 2]);
         Texture::Image { image, wrap, filter, uv: UvTransform::IDENTITY, scale: Rgb::ONE }
@@ -184,7 +193,7 @@ mod tests {
 
     #[test]
     fn rows_run_with_v_and_transforms_come_first() {
-        let image = Image { width: 1, height: 2, texels: vec![Rgb::ZERO, Rgb::ONE], alpha: Vec::new() };
+        let image = Image { width: 1, height: 2, texels: vec![Rgb::ZERO, Rgb::ONE].into() };
         let uv = UvTransform([0.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
         let texture = Texture::Image {
             image: Arc::new(image),

@@ -1,10 +1,13 @@
 //! Textures: anything that gives a colour or a number at texture coordinates.
 
 mod eval;
+mod texels;
 
 use crate::math::Vec2;
 use crate::spectrum::Rgb;
 use std::sync::Arc;
+
+pub use texels::{Samples, Texels};
 
 /// Index of a texture in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,9 +21,7 @@ pub struct Image {
     /// Height in texels, > 0.
     pub height: u32,
     /// `width * height` texels, row-major.
-    pub texels: Vec<Rgb>,
-    /// `width * height` alpha values; empty = opaque.
-    pub alpha: Vec<f32>,
+    pub texels: Texels,
 }
 
 /// What lies outside [0, 1).

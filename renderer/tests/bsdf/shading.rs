@@ -30,7 +30,7 @@ fn hit(tilt: f32) -> Interaction {
 /// A texture of one texel.
 fn flat(colour: Rgb) -> Texture {
     Texture::Image {
-        image: Arc::new(Image { width: 1, height: 1, texels: vec![colour], alpha: Vec::new() }),
+        image: Arc::new(Image { width: 1, height: 1, texels: vec![colour].into() }),
         wrap: [Wrap::Repeat; 2],
         filter: Filter::Linear,
         uv: UvTransform::IDENTITY,

@@ -26,7 +26,7 @@ fn one_texel(probe: &mut Probe, filter: Filter, wrap: Wrap) {
     let mut desc = room();
     for material in &mut desc.materials {
         let Material::Lambert { reflectance: RgbParam::Const(colour) } = *material else { continue };
-        let image = Arc::new(Image { width: 1, height: 1, texels: vec![colour], alpha: Vec::new() });
+        let image = Arc::new(Image { width: 1, height: 1, texels: vec![colour].into() });
         let uv = UvTransform([1e3, 0.0, -0.3, 0.0, -1e-3, 1e4]);
         desc.textures.push(Texture::Image { image, wrap: [wrap; 2], filter, uv, scale: Rgb::ONE });
         let id = TextureId(desc.textures.len() as u32 - 1);

@@ -86,26 +86,30 @@ pub(in crate::light) fn emitters() -> Vec<(&'static str, Geometry, Vec<Texture>,
 /// Name, picture, placement.
 pub(in crate::light) fn environments() -> Vec<(&'static str, Image, DAffine3)> {
     let mut sampler = IndependentSampler::new([2]);
-    let mut picture = |width: u32, height: u32, lit: f32| {
+    let mut texels = |count: usize, lit: f32| {
         let texel = |s: &mut IndependentSampler| {
             let on = if s.next_1d() < lit { 1.0 } else { 0.0 };
             Rgb::new(s.next_1d(), s.next_1d(), s.next_1d()) * on
         };
-        let texels = (0..width * height).map(|_| texel(&mut sampler)).collect();
-        Image { width, height, texels, alpha: Vec::new() }
+        (0..count).map(|_| texel(&mut sampler)).collect::<Vec<Rgb>>()
     };
+    let picture = |width: u32, height: u32, texels: Vec<Rgb>| Image { width, height, texels: texels.into() };
     let turned = DAffine3::from_quat(glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.4, 1.1, -0.7));
-    let mut sun = picture(16, 8, 0.0);
-    sun.texels[3 * 16 + 15] = Rgb::splat(50.0);
-    let mut pole = picture(5, 4, 0.0);
-    pole.texels[2] = Rgb::ONE;
+    let mut sun = texels(16 * 8, 0.0);
+    sun[3 * 16 + 15] = Rgb::splat(50.0);
+    let mut pole = texels(5 * 4, 0.0);
+    pole[2] = Rgb::ONE;
     vec![
-        ("sky, 8 x 5", picture(8, 5, 1.0), turned),
-        ("sky, mostly black", picture(9, 6, 0.2), DAffine3::from_scale(DVec3::new(-3.0, 3.0, 3.0)) * turned),
-        ("sky, one texel", picture(1, 1, 1.0), DAffine3::IDENTITY),
-        ("sky, one row", picture(4, 1, 1.0), turned),
-        ("sky, one column", picture(1, 6, 1.0), turned),
-        ("sky, sun at the seam", sun, turned),
-        ("sky, light at the pole", pole, DAffine3::IDENTITY),
+        ("sky, 8 x 5", picture(8, 5, texels(40, 1.0)), turned),
+        (
+            "sky, mostly black",
+            picture(9, 6, texels(54, 0.2)),
+            DAffine3::from_scale(DVec3::new(-3.0, 3.0, 3.0)) * turned,
+        ),
+        ("sky, one texel", picture(1, 1, texels(1, 1.0)), DAffine3::IDENTITY),
+        ("sky, one row", picture(4, 1, texels(4, 1.0)), turned),
+        ("sky, one column", picture(1, 6, texels(6, 1.0)), turned),
+        ("sky, sun at the seam", picture(16, 8, sun), turned),
+        ("sky, light at the pole", picture(5, 4, pole), DAffine3::IDENTITY),
     ]
 }

@@ -4,14 +4,14 @@ use crate::light::{EnvironmentLight, Light, LightDesc, LightError, roster};
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::sampling::{IndependentSampler, Sampler, warp};
 use crate::spectrum::Rgb;
-use crate::texture::Image;
+use crate::texture::{Image, Samples, Texels};
 use std::sync::Arc;
 
 /// An 8 x 4 picture with one white texel.
 fn one_texel(x: usize, y: usize) -> Image {
     let mut texels = vec![Rgb::ZERO; 32];
     texels[y * 8 + x] = Rgb::ONE;
-    Image { width: 8, height: 4, texels, alpha: Vec::new() }
+    Image { width: 8, height: 4, texels: texels.into() }
 }
 
 fn sky(image: Image, to_world: DAffine3) -> Result<Option<Light>, LightError> {
@@ -63,15 +63,19 @@ fn density_wherever_there_is_light() {
 
 #[test]
 fn bad_pictures() {
-    let size = |width, height, n: usize| Image { width, height, texels: vec![Rgb::ONE; n], alpha: Vec::new() };
+    let size = |width, height, n: usize| Image { width, height, texels: vec![Rgb::ONE; n].into() };
     assert_eq!(sky(size(2, 2, 3), DAffine3::IDENTITY).unwrap_err(), LightError::Picture);
     assert_eq!(sky(size(0, 2, 0), DAffine3::IDENTITY).unwrap_err(), LightError::Picture);
     assert_eq!(sky(size(2, 1, 2), DAffine3::from_scale(DVec3::ZERO)).unwrap_err(), LightError::Transform);
-    let mut bright = size(2, 1, 2);
-    bright.texels[1].g = f32::INFINITY;
+    let bright = Image { width: 2, height: 1, texels: vec![Rgb::ONE, Rgb::new(1.0, f32::INFINITY, 1.0)].into() };
     assert_eq!(sky(bright, DAffine3::IDENTITY).unwrap_err(), LightError::Emission);
+    static BLACK: [f32; 256] = [0.0; 256];
+    let side = 16384;
+    let bytes = Samples::new(vec![0u8; side * (side / 2 + 1)], 1, &BLACK).unwrap();
+    let vast = Image { width: side as u32, height: side as u32 / 2 + 1, texels: Texels::Bytes(bytes) };
+    let refused = sky(vast, DAffine3::IDENTITY).unwrap_err();
+    assert_eq!(refused.to_string(), "its picture has more than 134217728 texels, too many to sample");
     // Black, also after negative texels count as zero.
-    let mut black = size(2, 1, 2);
-    black.texels.fill(Rgb::splat(-1.0));
+    let black = Image { width: 2, height: 1, texels: vec![Rgb::splat(-1.0); 2].into() };
     assert!(EnvironmentLight::new(Arc::new(black), Rgb::ONE, &DAffine3::IDENTITY).unwrap().is_none());
 }

@@ -4,7 +4,7 @@ mod exr;
 mod integer;
 
 use crate::spectrum::Rgb;
-use crate::texture::Image;
+use crate::texture::{Image, Texels};
 use ::image::ImageDecoder;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,19 +24,19 @@ pub enum ImageKind {
 pub struct ImageLimits {
     /// Texels along each side.
     pub side: u32,
-    /// Bytes of the decoded [`Image`].
+    /// Bytes of the texels as they are kept, or as they are decoded, with alpha.
     pub bytes: u64,
 }
 
 impl Default for ImageLimits {
     fn default() -> Self {
-        Self { side: 32_768, bytes: 512 << 20 }
+        Self { side: 32_768, bytes: 1 << 30 }
     }
 }
 
 impl ImageLimits {
-    /// Bytes that a picture of this size takes; an error when it is empty or beyond the limits.
-    fn check(&self, width: u64, height: u64, alpha: bool) -> Result<u64, String> {
+    /// Bytes that a picture of this size takes at `texel` bytes a texel; an error when it is empty or beyond the limits.
+    fn check(&self, width: u64, height: u64, texel: usize) -> Result<u64, String> {
         if width == 0 || height == 0 {
             return Err(format!("the picture is empty ({width} x {height} texels)"));
         }
@@ -44,7 +44,6 @@ impl ImageLimits {
         if width > side || height > side {
             return Err(format!("{width} x {height} texels are too many: at most {side} along a side are read"));
         }
-        let texel = size_of::<Rgb>() + if alpha { size_of::<f32>() } else { 0 };
         let bytes = width * height * texel as u64;
         if bytes > self.bytes {
             let mib = |b: u64| b.div_ceil(1 << 20);
@@ -90,7 +89,10 @@ pub fn decode_image_within(
         Format::Jpeg => integer::decode_jpeg(bytes, kind, limits).map(|image| (image, None)),
     });
     let (mut image, mut note) = decoded.map_err(|e| format!("{path:?} can't be read as {}: {e}", format.name()))?;
-    check_texels(&mut image, kind, &mut note).map_err(|e| format!("{path:?}: {e}"))?;
+    // What is made of integers is finite.
+    if let Texels::Float(texels) = &mut image.texels {
+        check_texels(texels, image.width, kind, &mut note).map_err(|e| format!("{path:?}: {e}"))?;
+    }
     Ok(DecodedImage { image, note: note.map(|n| format!("{path:?}: {n}")) })
 }
 
@@ -128,32 +130,31 @@ fn decode_hdr(bytes: &[u8], limits: &ImageLimits) -> Result<(Image, Option<Strin
     // The decoder's strict mode knows only one of the two signatures in use; both are checked already.
     let decoder = ::image::codecs::hdr::HdrDecoder::new_nonstrict(bytes).map_err(|e| e.to_string())?;
     let meta = decoder.metadata();
-    limits.check(meta.width.into(), meta.height.into(), false)?;
+    limits.check(meta.width.into(), meta.height.into(), size_of::<Rgb>())?;
     let factor = meta.exposure.filter(|e| *e != 1.0);
     let note = factor.map(|e| format!("EXPOSURE={e} in the header is not applied: texels are taken as stored"));
     let mut texels = vec![Rgb::ZERO; meta.width as usize * meta.height as usize];
     decoder.read_image(bytemuck::cast_slice_mut(&mut texels)).map_err(|e| e.to_string())?;
-    Ok((Image { width: meta.width, height: meta.height, texels, alpha: Vec::new() }, note))
+    Ok((Image { width: meta.width, height: meta.height, texels: texels.into() }, note))
 }
 
 /// Refuses NaN and infinity, saying where; raises negative colours to zero, saying how many.
-fn check_texels(image: &mut Image, kind: ImageKind, note: &mut Option<String>) -> Result<(), String> {
-    let place = |i: usize| (i % image.width as usize, i / image.width as usize);
+fn check_texels(texels: &mut [Rgb], width: u32, kind: ImageKind, note: &mut Option<String>) -> Result<(), String> {
+    let place = |i: usize| (i % width as usize, i / width as usize);
     let finite = |t: &Rgb| t.r.is_finite() && t.g.is_finite() && t.b.is_finite();
-    let bad_alpha = image.alpha.iter().position(|a| !a.is_finite());
-    if let Some(first) = image.texels.iter().position(|t| !finite(t)).or(bad_alpha) {
-        let count = image.texels.iter().filter(|t| !finite(t)).count().max(1);
+    if let Some(first) = texels.iter().position(|t| !finite(t)) {
+        let count = texels.iter().filter(|t| !finite(t)).count();
         let (x, y) = place(first);
-        let t = image.texels[first];
+        let t = texels[first];
         return Err(format!(
             "{count} of its texels are infinite or not numbers, first at column {x}, row {y} ({}, {}, {}); \
              every texel must be finite",
             t.r, t.g, t.b
         ));
     }
-    if kind == ImageKind::Srgb && image.texels.iter().any(|t| t.min_component() < 0.0) {
+    if kind == ImageKind::Srgb && texels.iter().any(|t| t.min_component() < 0.0) {
         let (mut count, mut lowest) = (0, 0.0f32);
-        for t in image.texels.iter_mut().filter(|t| t.min_component() < 0.0) {
+        for t in texels.iter_mut().filter(|t| t.min_component() < 0.0) {
             count += 1;
             lowest = lowest.min(t.min_component());
             *t = t.map(|v| v.max(0.0));

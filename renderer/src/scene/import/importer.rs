@@ -8,8 +8,7 @@ use crate::geometry::{Mesh, MeshId};
 use crate::math::{DAffine3, Transform};
 use crate::scene::bundle::{FileSource, resolve};
 use crate::scene::desc::{SceneDesc, ShapeDesc};
-use crate::spectrum::Rgb;
-use crate::texture::{Image, Texture, TextureId};
+use crate::texture::{Image, Texels, Texture, TextureId};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::sync::Arc;
@@ -325,9 +324,7 @@ pub(super) fn short_name(name: &str) -> String {
 }
 
 fn grey(image: Arc<Image>) -> Arc<Image> {
-    let mut image = image.as_ref().clone();
-    image.texels.iter_mut().for_each(|t| *t = Rgb::splat(t.luminance()));
-    Arc::new(image)
+    Arc::new(Image { width: image.width, height: image.height, texels: Texels::Luminance(image) })
 }
 
 /// `line 3, column 14` of the byte at `offset`, both counted from 1, columns in characters.

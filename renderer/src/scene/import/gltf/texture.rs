@@ -120,8 +120,7 @@ impl Importer<'_> {
         let limits = ImageLimits::default();
         let limits = ImageLimits { bytes: limits.bytes.min(self.image_bytes_left), ..limits };
         let decoded = decode_image_within(&bytes, &name, kind, &limits).map_err(|e| Fault::new(&own, e))?;
-        let used = decoded.image.texels.len() * size_of::<Rgb>() + decoded.image.alpha.len() * size_of::<f32>();
-        self.image_bytes_left = self.image_bytes_left.saturating_sub(used as u64);
+        self.image_bytes_left = self.image_bytes_left.saturating_sub(decoded.image.texels.bytes() as u64);
         if let Some(note) = decoded.note {
             self.report.warn(Fault::new(own, note));
         }

@@ -136,7 +136,7 @@ fn studio() -> Image {
         let d = DVec3::new(sin64(theta) * sin64(phi), cos64(theta), -sin64(theta) * cos64(phi));
         Rgb::splat((0.5 + 0.3 * d.y + 8.0 * pow64(d.dot(key).max(0.0), 32.0)) as f32)
     };
-    Image { width, height, texels: (0..width * height).map(texel).collect(), alpha: Vec::new() }
+    Image { width, height, texels: (0..width * height).map(texel).collect::<Vec<_>>().into() }
 }
 
 /// A camera in front of the box (towards +Z) and above it that has all of it in the picture, be it 16:9 or narrower.

@@ -1,4 +1,4 @@
-//! OpenEXR: the first layer's R, G, B(, A), or Y, or only channel, as half or float.
+//! OpenEXR: the first layer's R, G, B, or Y, or only channel, as half or float.
 
 use super::ImageLimits;
 use crate::spectrum::Rgb;
@@ -14,7 +14,6 @@ use std::io::Cursor;
 enum Target {
     Colour(usize),
     Grey,
-    Alpha,
     None,
 }
 
@@ -26,9 +25,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Image, String
     let header = reader.headers().first().ok_or("it has no layers")?.clone();
     let targets = targets(&header.channels)?;
     let (width, height) = (header.layer_size.0, header.layer_size.1);
-    let has_alpha = targets.contains(&Target::Alpha);
     let mut texels = vec![Rgb::ZERO; width * height];
-    let mut alpha = vec![0.0; if has_alpha { width * height } else { 0 }];
     // Pedantic about the offset table: it must name every block once.
     let chunks = reader
         .filter_chunks(true, |_, tile, block| block.layer == 0 && tile.is_largest_resolution_level())
@@ -58,7 +55,6 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Image, String
                 _ => line.read_samples::<f32>().collect::<Result<_, _>>().map_err(text)?,
             };
             match target {
-                Target::Alpha => alpha[range].copy_from_slice(&samples),
                 Target::Grey => texels[range].iter_mut().zip(samples).for_each(|(t, v)| *t = Rgb::splat(v)),
                 Target::Colour(0) => texels[range].iter_mut().zip(samples).for_each(|(t, v)| t.r = v),
                 Target::Colour(1) => texels[range].iter_mut().zip(samples).for_each(|(t, v)| t.g = v),
@@ -69,7 +65,7 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Image, String
     if covered != width * height {
         return Err(format!("it is incomplete: {covered} of {} texels are there", width * height));
     }
-    Ok(Image { width: width as u32, height: height as u32, texels, alpha })
+    Ok(Image { width: width as u32, height: height as u32, texels: texels.into() })
 }
 
 /// Checks sizes of all layers against the limits and against what the file can hold.
@@ -82,7 +78,7 @@ fn check_headers(headers: &[Header], file: usize, limits: &ImageLimits) -> Resul
                 "DWA compression is not supported (its texels depend on the machine); save it as ZIP or PIZ".into()
             );
         }
-        limits.check(h.layer_size.0 as u64, h.layer_size.1 as u64, true)?;
+        limits.check(h.layer_size.0 as u64, h.layer_size.1 as u64, size_of::<Rgb>())?;
         // One block may hold every line of the picture with all channels.
         let area = h.layer_size.0 as u64 * h.layer_size.1 as u64;
         let bytes = area.saturating_mul(h.channels.bytes_per_pixel as u64);
@@ -97,7 +93,7 @@ fn check_headers(headers: &[Header], file: usize, limits: &ImageLimits) -> Resul
     Ok(())
 }
 
-/// Finds the channels by name: R, G, B and A, alone or behind one prefix (`diffuse.R`), else Y, else the only one there is.
+/// Finds the channels by name: R, G and B, alone or behind one prefix (`diffuse.R`), else Y, else the only one there is.
 fn targets(channels: &ChannelList) -> Result<Vec<Target>, String> {
     let names: Vec<String> = channels.list.iter().map(|c| c.name.to_string()).collect();
     let find = |name: &str| names.iter().position(|n| n.eq_ignore_ascii_case(name));
@@ -107,9 +103,6 @@ fn targets(channels: &ChannelList) -> Result<Vec<Target>, String> {
         let rgb = ["R", "G", "B"].map(|c| find(&format!("{prefix}{c}")));
         if let [Some(r), Some(g), Some(b)] = rgb {
             (out[r], out[g], out[b]) = (Target::Colour(0), Target::Colour(1), Target::Colour(2));
-            if let Some(a) = find(&format!("{prefix}A")) {
-                out[a] = Target::Alpha;
-            }
             return checked(channels, out);
         }
     }
@@ -119,9 +112,6 @@ fn targets(channels: &ChannelList) -> Result<Vec<Target>, String> {
     let grey = find("Y").or((names.len() == 1).then_some(0));
     let grey = grey.ok_or_else(|| format!("expected channels R, G, B or Y, found {}", names.join(", ")))?;
     out[grey] = Target::Grey;
-    if let Some(a) = find("A").filter(|a| *a != grey) {
-        out[a] = Target::Alpha;
-    }
     checked(channels, out)
 }
 

@@ -1,10 +1,9 @@
-//! PNG and JPEG: 8- and 16-bit samples to linear f32.
+//! PNG and JPEG: 8- and 16-bit samples, and the tables that make them linear.
 
 use super::{ImageKind, ImageLimits};
 use crate::math::pow64;
-use crate::spectrum::Rgb;
-use crate::texture::Image;
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
+use crate::texture::{Image, Samples, Texels};
+use image::{ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 use std::sync::OnceLock;
 use zune_jpeg::JpegDecoder;
@@ -19,10 +18,25 @@ pub(super) fn decode_png(bytes: &[u8], kind: ImageKind, limits: &ImageLimits) ->
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
     reader.limits(own);
     let decoder = reader.into_decoder().map_err(|e| e.to_string())?;
-    let (width, height) = decoder.dimensions();
-    limits.check(width.into(), height.into(), decoder.color_type().has_alpha())?;
-    let decoded = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?;
-    to_linear(&decoded, kind)
+    let ((width, height), colour) = (decoder.dimensions(), decoder.color_type());
+    let (channels, texel) = (usize::from(colour.channel_count()), usize::from(colour.bytes_per_pixel()));
+    limits.check(width.into(), height.into(), texel)?;
+    let samples = width as usize * height as usize * channels;
+    let texels = match texel / channels {
+        1 => {
+            let mut data = vec![0u8; samples];
+            decoder.read_image(&mut data).map_err(|e| e.to_string())?;
+            Samples::new(data, channels, table8(kind)).map(Texels::Bytes)
+        }
+        2 => {
+            let mut data = vec![0u16; samples];
+            decoder.read_image(bytemuck::cast_slice_mut(&mut data)).map_err(|e| e.to_string())?;
+            Samples::new(data, channels, table16(kind)).map(Texels::Words)
+        }
+        _ => None,
+    };
+    let texels = texels.ok_or("its sample type is not supported; expected 8 or 16 bits")?;
+    Ok(Image { width, height, texels })
 }
 
 /// JPEG, orientation tags not applied. The decoder is built without SIMD, because texels must not depend on the machine, and strict,
@@ -33,17 +47,14 @@ pub(super) fn decode_jpeg(bytes: &[u8], kind: ImageKind, limits: &ImageLimits) -
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
     decoder.decode_headers().map_err(|e| e.to_string())?;
     let (width, height) = decoder.dimensions().ok_or("it has no size")?;
-    limits.check(width as u64, height as u64, false)?;
     let grey = decoder.input_colorspace() == Some(ColorSpace::Luma);
-    decoder.set_options(options.jpeg_set_out_colorspace(if grey { ColorSpace::Luma } else { ColorSpace::RGB }));
-    let samples = decoder.decode().map_err(|e| e.to_string())?;
-    let (width, height) = (width as u32, height as u32);
-    let decoded = if grey {
-        ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageLuma8)
-    } else {
-        ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageRgb8)
-    };
-    to_linear(&decoded.ok_or("it holds fewer texels than its header says")?, kind)
+    let (channels, space) = if grey { (1, ColorSpace::Luma) } else { (3, ColorSpace::RGB) };
+    limits.check(width as u64, height as u64, channels)?;
+    decoder.set_options(options.jpeg_set_out_colorspace(space));
+    let data = decoder.decode().map_err(|e| e.to_string())?;
+    let samples = (data.len() == width * height * channels).then(|| Samples::new(data, channels, table8(kind)));
+    let samples = samples.flatten().ok_or("it holds other numbers of texels than its header says")?;
+    Ok(Image { width: width as u32, height: height as u32, texels: Texels::Bytes(samples) })
 }
 
 /// The sRGB decoding function (IEC 61966-2-1) of an encoded value in [0, 1].
@@ -66,31 +77,4 @@ fn table8(kind: ImageKind) -> &'static [f32] {
 fn table16(kind: ImageKind) -> &'static [f32] {
     static TABLES: [OnceLock<Vec<f32>>; 2] = [OnceLock::new(), OnceLock::new()];
     TABLES[kind as usize].get_or_init(|| table(65_536, kind))
-}
-
-/// Converts a decoded picture; alpha is never sRGB-encoded.
-fn to_linear(decoded: &DynamicImage, kind: ImageKind) -> Result<Image, String> {
-    let (t8, t16) = (table8(kind), table16(kind));
-    let (a8, a16) = (table8(ImageKind::Raw), table16(ImageKind::Raw));
-    let (texels, alpha) = match decoded {
-        DynamicImage::ImageLuma8(b) => split::<_, 1>(b, t8, a8),
-        DynamicImage::ImageLumaA8(b) => split::<_, 2>(b, t8, a8),
-        DynamicImage::ImageRgb8(b) => split::<_, 3>(b, t8, a8),
-        DynamicImage::ImageRgba8(b) => split::<_, 4>(b, t8, a8),
-        DynamicImage::ImageLuma16(b) => split::<_, 1>(b, t16, a16),
-        DynamicImage::ImageLumaA16(b) => split::<_, 2>(b, t16, a16),
-        DynamicImage::ImageRgb16(b) => split::<_, 3>(b, t16, a16),
-        DynamicImage::ImageRgba16(b) => split::<_, 4>(b, t16, a16),
-        _ => return Err("its sample type is not supported; expected 8 or 16 bits".into()),
-    };
-    Ok(Image { width: decoded.width(), height: decoded.height(), texels, alpha })
-}
-
-/// Texels and alpha of interleaved samples with `N` channels: grey, grey and alpha, RGB, or RGBA.
-fn split<T: Copy + Into<usize>, const N: usize>(samples: &[T], colour: &[f32], alpha: &[f32]) -> (Vec<Rgb>, Vec<f32>) {
-    let (pixels, _) = samples.as_chunks::<N>();
-    let value = |p: &[T; N], i: usize| colour[p[i].into()];
-    let texel = |p| if N < 3 { Rgb::splat(value(p, 0)) } else { Rgb::new(value(p, 0), value(p, 1), value(p, 2)) };
-    let alphas = if N.is_multiple_of(2) { pixels.iter().map(|p| alpha[p[N - 1].into()]).collect() } else { Vec::new() };
-    (pixels.iter().map(texel).collect(), alphas)
 }

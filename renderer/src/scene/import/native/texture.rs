@@ -151,7 +151,7 @@ fn written_picture(importer: &mut Importer, size: Item, pixels: Item) -> Option<
     for item in list {
         texels.push(item.rgb(importer, "pixels", Bound::NotNegative)?);
     }
-    Some(Image { width, height, texels, alpha: Vec::new() })
+    Some(Image { width, height, texels: texels.into() })
 }
 
 /// From `uv = { flip_v, scale, rotate, translate }`, applied in that order.

@@ -7,7 +7,7 @@ use crate::texture::{Filter, FloatParam, RgbParam, Texture, TextureId, Wrap};
 
 fn texel(scene: &SceneDesc, id: TextureId) -> Rgb {
     let Texture::Image { image, .. } = &scene.textures[id.0 as usize] else { panic!("not an image") };
-    image.texels[0]
+    image.texel(0, 0)
 }
 
 fn close(a: Rgb, b: [f32; 3]) -> bool {

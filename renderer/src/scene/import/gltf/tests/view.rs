@@ -60,10 +60,10 @@ fn the_stand_in_camera_sees_everything() {
 fn the_stand_in_light_has_a_bright_side() {
     let (scene, _) = File::triangle().load();
     let [LightDesc::Environment { image, .. }] = &scene.lights[..] else { panic!() };
-    let at = |x: u32, y: u32| image.texels[(y * image.width + x) as usize].r;
+    let at = |x: u32, y: u32| image.texel(x, y).r;
     // Zenith and nadir away from the key light.
     assert!((at(64, 0) - 0.8).abs() < 0.05 && (at(64, 63) - 0.2).abs() < 0.01);
-    let brightest = (0..image.texels.len()).max_by(|a, b| image.texels[*a].r.total_cmp(&image.texels[*b].r)).unwrap();
+    let (brightest, _) = image.texels.iter().enumerate().max_by(|(_, a), (_, b)| a.r.total_cmp(&b.r)).unwrap();
     let (x, y) = (brightest as u32 % image.width, brightest as u32 / image.width);
     // (-0.5, 0.8, 0.6): u = 0.5 + atan2(-0.5, -0.6) / 2 pi, elevation 46 degrees.
     let (u, v) = ((x as f32 + 0.5) / image.width as f32, (y as f32 + 0.5) / image.height as f32);
