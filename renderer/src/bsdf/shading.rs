@@ -72,7 +72,7 @@ impl ShadingPoint {
         wo: Vec3,
     ) -> Self {
         let at = At { textures, uv: hit.uv };
-        let mut frame = Frame::from_normal_tangent(hit.ns, hit.dpdu);
+        let mut frame = hit.frame;
         let mut material = materials[material.0 as usize];
         let mut bent = false;
         // Unwrap two-sided materials and normal maps.
@@ -87,7 +87,7 @@ impl ShadingPoint {
                 }
                 Material::NormalMap { inner, texture, scale, mirrors_with_uv } => {
                     let colour = textures[texture.0 as usize].eval(hit.uv);
-                    let mirrored = mirrors_with_uv && hit.ns.dot(hit.dpdu.cross(hit.dpdv)) > 0.0;
+                    let mirrored = mirrors_with_uv && hit.frame.n.dot(hit.dpdu.cross(hit.dpdv)) > 0.0;
                     if let Some(f) = bent_frame(&frame, hit, colour, scale, mirrored) {
                         frame = f;
                         bent = true;
