@@ -1,7 +1,7 @@
 //! The BSDF at a hit, in world space: frame, sides, normal maps.
 
 use super::resolve::At;
-use super::{Bsdf, Lambert, Lobe, Material, MaterialId, Transport};
+use super::{Bsdf, Lobe, Material, MaterialId, Transport};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Vec2, Vec3};
 use crate::spectrum::Rgb;
@@ -64,6 +64,7 @@ pub struct ShadingPoint {
 
 impl ShadingPoint {
     /// Evaluates `material` at `hit` for the world-space unit direction `wo` towards the previous vertex.
+    #[inline]
     pub fn new(
         materials: &[Material],
         textures: &[Texture],
@@ -73,17 +74,17 @@ impl ShadingPoint {
     ) -> Self {
         let at = At { textures, uv: hit.uv };
         let mut frame = hit.frame;
-        let mut material = materials[material.0 as usize];
+        let mut material = &materials[material.0 as usize];
         let mut bent = false;
         // Unwrap two-sided materials and normal maps.
         for _ in 0..MAX_NESTING {
-            match material {
+            match *material {
                 Material::TwoSided { front, back } => {
                     let is_front = wo.dot(frame.n) > 0.0;
                     if !is_front {
                         frame.n = -frame.n;
                     }
-                    material = materials[if is_front { front } else { back }.0 as usize];
+                    material = &materials[if is_front { front } else { back }.0 as usize];
                 }
                 Material::NormalMap { inner, texture, scale, mirrors_with_uv } => {
                     let colour = textures[texture.0 as usize].eval(hit.uv);
@@ -92,12 +93,12 @@ impl ShadingPoint {
                         frame = f;
                         bent = true;
                     }
-                    material = materials[inner.0 as usize];
+                    material = &materials[inner.0 as usize];
                 }
                 _ => break,
             }
         }
-        let bsdf = material.resolve(&at).unwrap_or(Bsdf::Lambert(Lambert { reflectance: Rgb::ZERO }));
+        let bsdf = material.resolve(&at);
         let sides = match (bsdf.transmits(), bent) {
             (false, _) => Sides::Same,
             (true, false) => Sides::Any,

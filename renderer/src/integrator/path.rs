@@ -114,8 +114,7 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             }
 
             // Go on in a direction drawn from the BSDF or the phase function.
-            let uc = self.sampler.next_1d();
-            let u = self.sampler.next_2d();
+            let (uc, u) = here.scattering.numbers(&mut self.sampler);
             let Some(s) = here.scattering.sample(uc, u, Transport::Radiance) else { break };
             beta *= here.scattering.weight(&s);
             if beta.is_black() || !beta.is_valid() {
@@ -231,8 +230,7 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
     /// Light that comes straight from a chosen light.
     fn next_event(&mut self, here: &Here, leg: &Leg) -> Rgb {
         let scene = self.c.scene;
-        let uc = self.sampler.next_1d();
-        let u = self.sampler.next_2d();
+        let (uc, u) = self.sampler.next_3();
         let Some(choice) = self.c.selector.sample(uc) else { return Rgb::ZERO };
         let light = &scene.lights[choice.index];
         let Here { anchor: from, object, scattering } = here;

@@ -3,6 +3,7 @@
 use crate::bsdf::{DirectionSample, Lobe, ShadingPoint, Transport};
 use crate::math::{Vec2, Vec3};
 use crate::medium::Medium;
+use crate::sampling::Sampler;
 use crate::spectrum::Rgb;
 
 /// A point of a medium that scatters, seen from `wo`. The scattering coefficient is in the weight of the flight that came here; what is
@@ -98,6 +99,25 @@ impl Scattering {
             Self::Surface(shading) => shading.is_delta_only(),
             Self::Medium(_) => false,
         }
+    }
+
+    /// Whether `sample` looks at `uc`.
+    #[inline]
+    fn chooses(&self) -> bool {
+        match self {
+            Self::Surface(shading) => shading.bsdf.chooses(),
+            Self::Medium(_) => false,
+        }
+    }
+
+    /// What `sample` needs.
+    #[inline]
+    pub fn numbers(&self, sampler: &mut impl Sampler) -> (f32, Vec2) {
+        if self.chooses() {
+            return sampler.next_3();
+        }
+        sampler.skip_1d();
+        (0.0, sampler.next_2d())
     }
 
     /// Rough share of light that is scattered, in [0, 1].

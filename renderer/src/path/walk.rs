@@ -191,9 +191,9 @@ impl Tracer<'_> {
     /// scaled by the square of; `None` where the walk ends.
     #[inline]
     fn depart(&self, path: &mut Subpath, sampler: &mut impl Sampler, head: &mut Head, mode: Transport) -> Option<f32> {
-        let (uc, u) = (sampler.next_1d(), sampler.next_2d());
         let last = path.vertices.last()?;
         let VertexKind::Inner(at) = &last.kind else { return None };
+        let (uc, u) = at.numbers(sampler);
         let s = at.sample(uc, u, mode)?;
         head.beta *= at.weight(&s);
         if mode == Transport::Importance {
