@@ -1,7 +1,7 @@
 //! The BSDF at a hit, in world space: frame, sides, normal maps.
 
 use super::resolve::At;
-use super::{Bsdf, Lobe, Material, MaterialId, Transport};
+use super::{Bsdf, Lambert, Lobe, Material, MaterialId, Transport};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Vec2, Vec3};
 use crate::spectrum::Rgb;
@@ -98,13 +98,23 @@ impl ShadingPoint {
                 _ => break,
             }
         }
-        let bsdf = material.resolve(&at);
+        let seen = |bsdf: Bsdf| Self::seen(frame, hit.ng, wo, bsdf, bent);
+        // Apart from the others, whose BSDFs come through memory and would be copied.
+        match *material {
+            Material::Lambert { reflectance } => seen(Bsdf::Lambert(Lambert::resolve(&at, reflectance))),
+            _ => seen(material.resolve(&at)),
+        }
+    }
+
+    /// What `bsdf` in `frame` is from `wo`; `bent`: the frame is that of a normal map.
+    #[inline(always)]
+    fn seen(frame: Frame, ng: Vec3, wo: Vec3, bsdf: Bsdf, bent: bool) -> Self {
         let sides = match (bsdf.transmits(), bent) {
             (false, _) => Sides::Same,
             (true, false) => Sides::Any,
             (true, true) => Sides::Consistent,
         };
-        Self { frame, ng: hit.ng, wo: frame.to_local(wo), bsdf, wo_dot_ng: wo.dot(hit.ng), sides }
+        Self { frame, ng, wo: frame.to_local(wo), bsdf, wo_dot_ng: wo.dot(ng), sides }
     }
 
     /// Value without cosine and density per solid angle for the world-space direction `wi`; delta lobes are in neither.
@@ -136,7 +146,8 @@ impl ShadingPoint {
     /// Draws `wi`: `uc` chooses the lobe, `u` the direction. `None` absorbs the path.
     #[inline]
     pub fn sample(&self, uc: f32, u: Vec2, mode: Transport) -> Option<DirectionSample> {
-        let s = self.bsdf.sample(self.wo, uc, u, mode)?;
+        let sample = self.bsdf.sample(self.wo, uc, u, mode);
+        let s = sample.as_ref()?;
         let wi = self.frame.to_world(s.wi).normalize();
         let cos_theta = s.wi.z.abs();
         self.joins(wi, s.wi).then_some(DirectionSample { wi, f: s.f, pdf: s.pdf, cos_theta, lobe: s.lobe, eta: s.eta })

@@ -133,23 +133,32 @@ impl Geometry {
     }
 
     /// What is known of the surface at `hit`, found with `ray`.
-    #[inline]
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
         let object = self.object(hit.object);
-        let s = match object.shape {
-            Shape::Mesh(mesh) => self.on_mesh(mesh, hit.object, hit.primitive, hit.b),
-            Shape::Sphere => sphere::at_hit(object, ray, hit.t),
-            Shape::Disk => disk::at_hit(object, ray, hit.t),
-        };
-        let SurfacePoint { p, p_error, ng, frame, uv, dpdu, dpdv } = s;
-        Interaction { p, p_error, ng, frame, uv, dpdu, dpdv, object: hit.object, primitive: hit.primitive }
+        match object.shape {
+            Shape::Mesh(mesh) => {
+                let mesh = self.mesh(mesh);
+                // Apart from the others, which come through memory and are copied.
+                match self.facet(hit.object, hit.primitive) {
+                    Some(facet) => facet.at(mesh, object, hit.primitive, hit.b).seen_as(hit),
+                    None => surface::at(mesh, object, hit.primitive, hit.b).seen_as(hit),
+                }
+            }
+            Shape::Sphere => sphere::at_hit(object, ray, hit.t).seen_as(hit),
+            Shape::Disk => disk::at_hit(object, ray, hit.t).seen_as(hit),
+        }
+    }
+
+    #[inline]
+    fn facet(&self, object: ObjectId, triangle: u32) -> Option<&Facet> {
+        self.facets.get(object.0 as usize)?.get(triangle as usize)
     }
 
     /// The point with weights `b` of a mesh's triangle.
     #[inline]
     fn on_mesh(&self, mesh: MeshId, id: ObjectId, triangle: u32, b: [f32; 2]) -> SurfacePoint {
         let (mesh, object) = (self.mesh(mesh), self.object(id));
-        match self.facets.get(id.0 as usize).and_then(|facets| facets.get(triangle as usize)) {
+        match self.facet(id, triangle) {
             Some(facet) => facet.at(mesh, object, triangle, b),
             None => surface::at(mesh, object, triangle, b),
         }

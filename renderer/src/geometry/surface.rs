@@ -1,6 +1,6 @@
 //! Points on a triangle of an object: interpolation of its corners, normals and texture coordinates, in the world.
 
-use super::{Mesh, Object};
+use super::{Hit, Interaction, Mesh, Object};
 use crate::math::rounding::gamma;
 use crate::math::{DVec3, Frame, Transform, Vec2, Vec3};
 
@@ -14,6 +14,15 @@ pub(super) struct SurfacePoint {
     pub uv: Vec2,
     pub dpdu: Vec3,
     pub dpdv: Vec3,
+}
+
+impl SurfacePoint {
+    /// What a ray that hits it sees.
+    #[inline(always)]
+    pub fn seen_as(self, hit: &Hit) -> Interaction {
+        let Self { p, p_error, ng, frame, uv, dpdu, dpdv } = self;
+        Interaction { p, p_error, ng, frame, uv, dpdu, dpdv, object: hit.object, primitive: hit.primitive }
+    }
 }
 
 /// What is the same all over a triangle in the world.
@@ -54,7 +63,7 @@ impl Face {
     }
 
     /// The point `p` with weights `b`; `ns` is its interpolated normal, `flat` the frame where there is none.
-    #[inline]
+    #[inline(always)]
     fn point(
         &self,
         (p, p_error): (Vec3, Vec3),
@@ -91,7 +100,7 @@ impl Facet {
     }
 
     /// What [`at`] gives.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, mesh: &Mesh, object: &Object, triangle: u32, b: [f32; 2]) -> SurfacePoint {
         let p = (self.corner + self.edges[0] * f64::from(b[0]) + self.edges[1] * f64::from(b[1])).as_vec3();
         let ns = if mesh.normals.is_empty() {

@@ -1,10 +1,12 @@
 //! What scatters at a vertex, surface or medium, in one interface.
 
-use crate::bsdf::{DirectionSample, Lobe, ShadingPoint, Transport};
+use crate::bsdf::{DirectionSample, Lobe, Material, MaterialId, ShadingPoint, Transport};
+use crate::geometry::Interaction;
 use crate::math::{Vec2, Vec3};
 use crate::medium::Medium;
 use crate::sampling::Sampler;
 use crate::spectrum::Rgb;
+use crate::texture::Texture;
 
 /// A point of a medium that scatters, seen from `wo`. The scattering coefficient is in the weight of the flight that came here; what is
 /// left is the phase function.
@@ -35,6 +37,17 @@ pub enum Scattering {
 }
 
 impl Scattering {
+    /// Evaluates `material` at `hit`, seen from `wo` ([`ShadingPoint::new`]).
+    pub fn at_surface(
+        materials: &[Material],
+        textures: &[Texture],
+        material: MaterialId,
+        hit: &Interaction,
+        wo: Vec3,
+    ) -> Self {
+        Self::Surface(ShadingPoint::new(materials, textures, material, hit, wo))
+    }
+
     /// Draws a direction: `uc` chooses between lobes, `u` the direction. `None` absorbs the path.
     #[inline]
     pub fn sample(&self, uc: f32, u: Vec2, mode: Transport) -> Option<DirectionSample> {
