@@ -107,7 +107,7 @@ impl Accel {
         }
         // `t_max` is exclusive, but distances found are inclusive: ties are settled by index.
         let mut t_max = ray.t_max.next_down();
-        let mut best = self.world.closest(ray, t_max).map(|h| {
+        let mut best = self.world.closest(ray, t_max).as_ref().map(|h| {
             let slot = match self.owners.get(h.id as usize) {
                 Some(slot) => *slot as usize,
                 None => self.starts.partition_point(|s| s.0 <= h.id) - 1,
