@@ -32,7 +32,7 @@ const ITEMS: usize = 4096;
 /// Rays between random points of a room of `triangles` triangles.
 fn rays(triangles: usize) -> (Accel, Vec<Ray>) {
     let object = Object { shape: Shape::Mesh(MeshId(0)), to_world: Transform::IDENTITY, flip_normals: false };
-    let geometry = Geometry { meshes: vec![room(triangles)], objects: vec![object] };
+    let geometry = Geometry::new(vec![room(triangles)], vec![object]);
     let mut random = Random(7);
     let mut point = || Vec3::new(random.next(), random.next(), random.next()) * 1.6 - Vec3::splat(0.8);
     let rays = (0..ITEMS).map(|_| {

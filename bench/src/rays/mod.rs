@@ -124,7 +124,7 @@ pub fn run(args: &Args) -> Result<Report, String> {
 /// A procedural room and camera rays in it.
 fn room_subject(triangles: usize) -> Subject {
     let object = Object { shape: Shape::Mesh(MeshId(0)), to_world: Transform::IDENTITY, flip_normals: false };
-    let geometry = Geometry { meshes: vec![room(triangles.max(1000))], objects: vec![object] };
+    let geometry = Geometry::new(vec![room(triangles.max(1000))], vec![object]);
     let camera = sets::pinhole(Vec3::new(0.9, 0.5, 0.9), Vec3::new(0.0, -0.2, 0.0), 1.6, SIDE);
     Subject { name: "room".into(), geometry, camera }
 }

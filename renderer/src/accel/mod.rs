@@ -39,6 +39,8 @@ pub enum AccelError {
 
 /// Largest coordinate: cubes of it (determinants) must not overflow.
 pub const LIMIT: f32 = 1e12;
+/// A table of more triangles' objects would not stay in caches.
+const MAX_OWNED: usize = 1 << 16;
 /// The top bit of a child tells leaves from nodes.
 const MAX_TRIANGLES: usize = (1 << 31) - 1;
 
@@ -49,6 +51,8 @@ pub struct Accel {
     world: Tree,
     /// First triangle of each object in `world`, ascending.
     starts: Vec<(u32, ObjectId)>,
+    /// The place in `starts` of each triangle of `world`, where there are few: a search takes as long as a leaf.
+    owners: Vec<u32>,
     /// The trees of instanced meshes.
     trees: Vec<Tree>,
     placed: Placed,
@@ -92,7 +96,8 @@ impl Accel {
         }
         let build = |mesh: usize| Tree::build(&triangles(&geometry.meshes[mesh]).collect::<Vec<_>>());
         let trees = instanced.into_iter().map(build).collect();
-        Ok(Self { world: Tree::build(&world), starts, trees, placed: Placed::new(items) })
+        let owners = if world.len() <= MAX_OWNED { owners(&starts, world.len()) } else { Vec::new() };
+        Ok(Self { world: Tree::build(&world), starts, owners, trees, placed: Placed::new(items) })
     }
 
     /// The nearest hit; of equal distances that of the smaller (object, primitive).
@@ -102,8 +107,11 @@ impl Accel {
         }
         // `t_max` is exclusive, but distances found are inclusive: ties are settled by index.
         let mut t_max = ray.t_max.next_down();
-        let mut best = self.world.closest(ray, t_max).map(|h| {
-            let slot = self.starts.partition_point(|s| s.0 <= h.id) - 1;
+        let mut best = self.world.closest(ray, t_max).as_ref().map(|h| {
+            let slot = match self.owners.get(h.id as usize) {
+                Some(slot) => *slot as usize,
+                None => self.starts.partition_point(|s| s.0 <= h.id) - 1,
+            };
             let (start, object) = self.starts[slot];
             Hit { t: h.t, object, primitive: h.id - start, b: h.b }
         });
@@ -124,6 +132,12 @@ impl Accel {
     pub fn bytes(&self) -> usize {
         self.world.bytes() + self.trees.iter().map(Tree::bytes).sum::<usize>()
     }
+}
+
+/// For each of `count` triangles, the place in `starts` of its object.
+fn owners(starts: &[(u32, ObjectId)], count: usize) -> Vec<u32> {
+    let ends = starts.iter().skip(1).map(|s| s.0).chain([count as u32]);
+    starts.iter().zip(ends).enumerate().flat_map(|(slot, (s, end))| (s.0..end).map(move |_| slot as u32)).collect()
 }
 
 /// Rays with NaN or without a direction hit nothing.

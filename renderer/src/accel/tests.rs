@@ -62,7 +62,7 @@ fn object(shape: Shape, to_world: DAffine3) -> Object {
 }
 
 fn single(mesh: Mesh) -> Geometry {
-    Geometry { meshes: vec![mesh], objects: vec![object(Shape::Mesh(MeshId(0)), DAffine3::IDENTITY)] }
+    Geometry::new(vec![mesh], vec![object(Shape::Mesh(MeshId(0)), DAffine3::IDENTITY)])
 }
 
 /// The nearest hit, by testing every triangle with the reference test.
@@ -224,7 +224,7 @@ fn mixed() -> Geometry {
         };
         objects.push(object(shape, DAffine3::from_scale_rotation_translation(scale, turn, p)));
     }
-    Geometry { meshes: vec![ball(10, 1.0), mesh_of(&soup(300, 2))], objects }
+    Geometry::new(vec![ball(10, 1.0), mesh_of(&soup(300, 2))], objects)
 }
 
 #[test]
@@ -234,7 +234,7 @@ fn instances_spheres_and_disks_are_hit_as_each_alone() {
     // Every object in an accelerator of its own, the others moved out of the way by emptying the list.
     let alone: Vec<(usize, Geometry, Accel)> = (0..g.objects.len())
         .map(|i| {
-            let one = Geometry { meshes: g.meshes.clone(), objects: vec![g.objects[i]] };
+            let one = Geometry::new(g.meshes.clone(), vec![g.objects[i]]);
             let accel = Accel::build(&one).unwrap();
             (i, one, accel)
         })
@@ -262,7 +262,7 @@ fn rays_that_leave_a_convex_surface_never_meet_it_again() {
         for (shape, instanced) in
             [(Shape::Sphere, false), (Shape::Mesh(MeshId(0)), false), (Shape::Mesh(MeshId(0)), true)]
         {
-            let mut g = Geometry { meshes: vec![ball(40, 1.0)], objects: vec![object(shape, m)] };
+            let mut g = Geometry::new(vec![ball(40, 1.0)], vec![object(shape, m)]);
             if !instanced {
                 g.bake();
             }

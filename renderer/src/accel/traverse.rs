@@ -122,6 +122,7 @@ pub(super) struct TreeHit {
 }
 
 /// The nearest hit with a parameter of at most `t_max`; of equal ones that of the smallest triangle number.
+#[inline]
 pub(super) fn closest(tree: &Tree, root: Child, ray: &Ray, t_max: f32, simd: Simd) -> Option<TreeHit> {
     match simd {
         Simd::Portable => closest_by::<Portable>(tree, root, ray, t_max),
@@ -137,6 +138,7 @@ pub(super) fn closest(tree: &Tree, root: Child, ray: &Ray, t_max: f32, simd: Sim
 }
 
 /// Whether any triangle is hit at a parameter of at most `t_max`.
+#[inline]
 pub(super) fn any(tree: &Tree, root: Child, ray: &Ray, t_max: f32, simd: Simd) -> bool {
     match simd {
         Simd::Portable => any_by::<Portable>(tree, root, ray, t_max),

@@ -61,6 +61,11 @@ impl Model for Conductor {
         self.facets.is_none()
     }
 
+    #[inline]
+    fn chooses(&self) -> bool {
+        false
+    }
+
     fn albedo(&self) -> Rgb {
         self.fresnel(1.0)
     }

@@ -13,6 +13,7 @@ pub struct Lambert {
 }
 
 impl Lambert {
+    #[inline]
     pub(super) fn resolve(at: &At, reflectance: RgbParam) -> Self {
         Self { reflectance: at.reflectance(reflectance) }
     }
@@ -33,6 +34,11 @@ impl Model for Lambert {
         let wi = warp::cosine_hemisphere(u);
         let (f, pdf) = self.eval_pdf(wo, wi, mode);
         (pdf > 0.0).then_some(BsdfSample { wi, f, pdf, lobe: Lobe::DIFFUSE, eta: 1.0 })
+    }
+
+    #[inline]
+    fn chooses(&self) -> bool {
+        false
     }
 
     fn albedo(&self) -> Rgb {

@@ -126,6 +126,11 @@ pub trait Model: Copy {
         false
     }
 
+    /// Whether `sample` looks at `uc`.
+    fn chooses(&self) -> bool {
+        true
+    }
+
     /// Whether anything passes to the other side.
     fn transmits(&self) -> bool {
         false
@@ -175,11 +180,14 @@ macro_rules! bsdfs {
                 }
             }
 
-            /// The BSDF at one point; `None` for materials that only wrap others.
-            fn resolve(&self, at: &At) -> Option<Bsdf> {
+            /// The BSDF at one point; black for materials that only wrap others.
+            #[inline]
+            fn resolve(&self, at: &At) -> Bsdf {
                 match *self {
-                    $(Self::$name { $($field),* } => Some(Bsdf::$name($name::resolve(at, $($field),*))),)*
-                    Self::TwoSided { .. } | Self::NormalMap { .. } | Self::Null => None,
+                    $(Self::$name { $($field),* } => Bsdf::$name($name::resolve(at, $($field),*)),)*
+                    Self::TwoSided { .. } | Self::NormalMap { .. } | Self::Null => {
+                        Bsdf::Lambert(Lambert { reflectance: Rgb::ZERO })
+                    }
                 }
             }
         }
@@ -201,6 +209,12 @@ macro_rules! bsdfs {
             #[inline]
             pub fn is_delta_only(&self) -> bool {
                 match self { $(Self::$name(m) => m.is_delta_only(),)* }
+            }
+
+            /// Whether `sample` looks at `uc`.
+            #[inline]
+            pub fn chooses(&self) -> bool {
+                match self { $(Self::$name(m) => m.chooses(),)* }
             }
 
             /// Whether anything passes to the other side.

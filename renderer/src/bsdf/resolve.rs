@@ -12,6 +12,7 @@ pub(super) struct At<'a> {
 
 impl At<'_> {
     /// A reflectance or transmittance in [0, 1].
+    #[inline]
     pub fn reflectance(&self, param: RgbParam) -> Rgb {
         param.eval(self.textures, self.uv).map(unit)
     }
@@ -36,6 +37,7 @@ impl At<'_> {
 const MAX_ALPHA: f32 = 10.0;
 
 /// Clamped to [0, 1]; NaN becomes 0.
+#[inline]
 fn unit(x: f32) -> f32 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }

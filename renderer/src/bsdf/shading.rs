@@ -64,6 +64,7 @@ pub struct ShadingPoint {
 
 impl ShadingPoint {
     /// Evaluates `material` at `hit` for the world-space unit direction `wo` towards the previous vertex.
+    #[inline]
     pub fn new(
         materials: &[Material],
         textures: &[Texture],
@@ -72,38 +73,48 @@ impl ShadingPoint {
         wo: Vec3,
     ) -> Self {
         let at = At { textures, uv: hit.uv };
-        let mut frame = Frame::from_normal_tangent(hit.ns, hit.dpdu);
-        let mut material = materials[material.0 as usize];
+        let mut frame = hit.frame;
+        let mut material = &materials[material.0 as usize];
         let mut bent = false;
         // Unwrap two-sided materials and normal maps.
         for _ in 0..MAX_NESTING {
-            match material {
+            match *material {
                 Material::TwoSided { front, back } => {
                     let is_front = wo.dot(frame.n) > 0.0;
                     if !is_front {
                         frame.n = -frame.n;
                     }
-                    material = materials[if is_front { front } else { back }.0 as usize];
+                    material = &materials[if is_front { front } else { back }.0 as usize];
                 }
                 Material::NormalMap { inner, texture, scale, mirrors_with_uv } => {
                     let colour = textures[texture.0 as usize].eval(hit.uv);
-                    let mirrored = mirrors_with_uv && hit.ns.dot(hit.dpdu.cross(hit.dpdv)) > 0.0;
+                    let mirrored = mirrors_with_uv && hit.frame.n.dot(hit.dpdu.cross(hit.dpdv)) > 0.0;
                     if let Some(f) = bent_frame(&frame, hit, colour, scale, mirrored) {
                         frame = f;
                         bent = true;
                     }
-                    material = materials[inner.0 as usize];
+                    material = &materials[inner.0 as usize];
                 }
                 _ => break,
             }
         }
-        let bsdf = material.resolve(&at).unwrap_or(Bsdf::Lambert(Lambert { reflectance: Rgb::ZERO }));
+        let seen = |bsdf: Bsdf| Self::seen(frame, hit.ng, wo, bsdf, bent);
+        // Apart from the others, whose BSDFs come through memory and would be copied.
+        match *material {
+            Material::Lambert { reflectance } => seen(Bsdf::Lambert(Lambert::resolve(&at, reflectance))),
+            _ => seen(material.resolve(&at)),
+        }
+    }
+
+    /// What `bsdf` in `frame` is from `wo`; `bent`: the frame is that of a normal map.
+    #[inline(always)]
+    fn seen(frame: Frame, ng: Vec3, wo: Vec3, bsdf: Bsdf, bent: bool) -> Self {
         let sides = match (bsdf.transmits(), bent) {
             (false, _) => Sides::Same,
             (true, false) => Sides::Any,
             (true, true) => Sides::Consistent,
         };
-        Self { frame, ng: hit.ng, wo: frame.to_local(wo), bsdf, wo_dot_ng: wo.dot(hit.ng), sides }
+        Self { frame, ng, wo: frame.to_local(wo), bsdf, wo_dot_ng: wo.dot(ng), sides }
     }
 
     /// Value without cosine and density per solid angle for the world-space direction `wi`; delta lobes are in neither.
@@ -135,7 +146,8 @@ impl ShadingPoint {
     /// Draws `wi`: `uc` chooses the lobe, `u` the direction. `None` absorbs the path.
     #[inline]
     pub fn sample(&self, uc: f32, u: Vec2, mode: Transport) -> Option<DirectionSample> {
-        let s = self.bsdf.sample(self.wo, uc, u, mode)?;
+        let sample = self.bsdf.sample(self.wo, uc, u, mode);
+        let s = sample.as_ref()?;
         let wi = self.frame.to_world(s.wi).normalize();
         let cos_theta = s.wi.z.abs();
         self.joins(wi, s.wi).then_some(DirectionSample { wi, f: s.f, pdf: s.pdf, cos_theta, lobe: s.lobe, eta: s.eta })

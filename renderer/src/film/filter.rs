@@ -42,6 +42,15 @@ impl Footprint {
         self.count[0] == 0 || self.count[1] == 0
     }
 
+    /// The rows of pixels: column of the first, row, the row's weight, and the columns' weights to multiply it by.
+    #[inline]
+    pub fn rows(&self) -> impl Iterator<Item = (u32, u32, f32, &[f32])> + '_ {
+        let [x, y] = self.origin;
+        let [wx, wy] = &self.weights;
+        let columns = &wx[..self.count[0]];
+        (y..).zip(&wy[..self.count[1]]).map(move |(y, wy)| (x, y, *wy, columns))
+    }
+
     /// (x, y, weight) of each pixel; weights are per pixel area.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (u32, u32, f32)> + '_ {
@@ -160,12 +169,14 @@ impl Filter {
     }
 
     /// The table cell that holds `t`, and where in it (0 to 1).
+    #[inline]
     fn cell(&self, t: f32) -> (usize, f32) {
         let x = ((t + self.radius) / self.step).max(0.0);
         let cell = (x as usize).min(self.density.len() - 2);
         (cell, (x - cell as f32).min(1.0))
     }
 
+    #[inline]
     fn density(&self, t: f32) -> f32 {
         let (cell, s) = self.cell(t);
         self.density[cell] + s * (self.density[cell + 1] - self.density[cell])
@@ -198,16 +209,30 @@ impl Filter {
             return (0, 0);
         }
         // Pixels with -radius <= x - centre < radius.
-        let first = ((x - self.radius - 0.5).floor() as i64 + 1).max(0);
-        let last = ((x + self.radius - 0.5).floor() as i64).min(i64::from(size) - 1);
+        let first = (floor(x - self.radius - 0.5) + 1).max(0);
+        let last = floor(x + self.radius - 0.5).min(i64::from(size) - 1);
         let count = (last + 1 - first).clamp(0, MAX_FOOTPRINT as i64) as usize;
         let first = first as u32;
         for (i, w) in (first..).zip(&mut weights[..count]) {
-            let (low, high) = self.inside(i, size);
-            *w = self.density(x - (i as f32 + 0.5)) / (high - low);
+            *w = self.density(x - (i as f32 + 0.5));
+        }
+        // Only near the borders is some of a filter outside.
+        if x < 2.0 * self.radius || size as f32 - x < 2.0 * self.radius {
+            for (i, w) in (first..).zip(&mut weights[..count]) {
+                let (low, high) = self.inside(i, size);
+                *w /= high - low;
+            }
         }
         (first, count)
     }
+}
+
+/// The largest integer that is not above `x`, which lies within some thousands of a picture. std's asks a library where the target has
+/// no instruction for it.
+#[inline]
+fn floor(x: f32) -> i64 {
+    let i = x as i64;
+    i - i64::from(i as f32 > x)
 }
 
 /// The unnormalised profile at distance `t` in [0, 1] radii.

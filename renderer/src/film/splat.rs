@@ -49,8 +49,11 @@ impl SplatSums {
     /// Adds `value` at a raster position to all pixels whose filter covers it.
     #[inline]
     pub fn splat(&mut self, filter: &Filter, raster: Vec2, value: Rgb) {
-        for (x, y, weight) in filter.weights(raster).iter() {
-            self.add(x, y, value * weight);
+        let footprint = filter.weights(raster);
+        for (x, y, wy, columns) in footprint.rows() {
+            for (x, wx) in (x..).zip(columns) {
+                self.add(x, y, value * (wx * wy));
+            }
         }
     }
 

@@ -1,14 +1,19 @@
 //! Meshes in world space where that costs no memory worth speaking of; the others stay shared and are instanced.
 
-use super::{Geometry, Mesh, MeshId, Shape};
+use super::surface::Facet;
+use super::{Geometry, Mesh, MeshId, Object, Shape};
 use crate::math::{Transform, Vec3};
 
 /// Meshes with fewer triangles are copied rather than instanced: an instance costs a transform of every ray that meets its box.
 const INSTANCE_TRIANGLES: usize = 64;
+/// What hits need of so many triangles of a mesh, and of so many altogether, is worked out beforehand: more would not stay in caches.
+const MESH_FACETS: usize = 1 << 13;
+const ALL_FACETS: usize = 1 << 16;
 
 impl Geometry {
     /// Moves every mesh that a single object uses to world space, gives every object of a small shared mesh its own copy, and
-    /// sets the transforms of these objects to the identity. Objects keep their indices, triangles theirs; meshes do not.
+    /// sets the transforms of these objects to the identity. Objects keep their indices, triangles theirs; meshes do not. Meshes and
+    /// objects must not change afterwards.
     ///
     /// Without it everything works, but every mesh with a transform is traversed as an instance.
     pub fn bake(&mut self) {
@@ -38,6 +43,24 @@ impl Geometry {
             }
             object.to_world = Transform::IDENTITY;
         }
+        self.prepare();
+    }
+
+    /// Works out the facets of small meshes.
+    fn prepare(&mut self) {
+        let mut left = ALL_FACETS;
+        let meshes = &self.meshes;
+        let facets = |object: &Object| {
+            let Shape::Mesh(id) = object.shape else { return Vec::new() };
+            let mesh = &meshes[id.0 as usize];
+            let count = mesh.triangles.len();
+            if !object.to_world.is_identity() || count > left.min(MESH_FACETS) {
+                return Vec::new();
+            }
+            left -= count;
+            (0..count as u32).map(|triangle| Facet::new(mesh, object, triangle)).collect()
+        };
+        self.facets = self.objects.iter().map(facets).collect();
     }
 }
 

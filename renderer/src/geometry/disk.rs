@@ -80,7 +80,8 @@ pub(super) fn at(object: &Object, x: f64, y: f64) -> SurfacePoint {
         let frame = Frame::from_normal(ng);
         (frame.s, frame.t)
     };
-    SurfacePoint { p, p_error: rounding(p), ng, ns: ng, uv, dpdu, dpdv }
+    let frame = Frame::from_normal_tangent(ng, dpdu);
+    SurfacePoint { p, p_error: rounding(p), ng, frame, uv, dpdu, dpdv }
 }
 
 /// Uniform point of the unit disk (Shirley and Chiu 1997, concentric map).

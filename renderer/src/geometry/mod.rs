@@ -10,8 +10,8 @@ pub mod triangle;
 pub use disk::WorldDisk;
 pub use mesh::{Mesh, MeshError};
 
-use crate::math::{Anchor, DVec3, Ray, Transform, Vec2, Vec3};
-use surface::SurfacePoint;
+use crate::math::{Anchor, DVec3, Frame, Ray, Transform, Vec2, Vec3};
+use surface::{Facet, SurfacePoint};
 
 /// Index of a mesh in [`Geometry::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -49,6 +49,8 @@ pub struct Geometry {
     pub meshes: Vec<Mesh>,
     /// In the order of the scene description.
     pub objects: Vec<Object>,
+    /// By object, the triangles of small meshes in world space; as `bake` left them, so that they must stay where they are.
+    facets: Vec<Vec<Facet>>,
 }
 
 /// Where a ray met an object. Independent of the acceleration tree: of equal `t`, the smaller (object, primitive) wins.
@@ -72,10 +74,10 @@ pub struct Interaction {
     /// Absolute error bound of each coordinate of `p`.
     pub p_error: Vec3,
     /// Unit geometric normal: triangle winding (counter-clockwise = outward), sphere outward, disk +z; mirrored transforms keep
-    /// "outward"; then `flip_normals`; turned into the hemisphere of `ns` if vertex normals disagree with the winding.
+    /// "outward"; then `flip_normals`; turned into the hemisphere of the shading normal if vertex normals disagree with the winding.
     pub ng: Vec3,
-    /// Unit shading normal (interpolated, or `ng`).
-    pub ns: Vec3,
+    /// The shading frame: around the unit shading normal (interpolated, or `ng`), x along `dpdu`.
+    pub frame: Frame,
     /// Texture coordinates.
     pub uv: Vec2,
     /// Derivative of `p` with `u`: the shading tangent; never zero.
@@ -113,8 +115,6 @@ pub struct SurfaceSample {
     pub ng: Vec3,
     /// Texture coordinates.
     pub uv: Vec2,
-    /// Density with respect to surface area.
-    pub pdf_area: f32,
 }
 
 /// A sphere that contains a scene.
@@ -127,26 +127,52 @@ pub struct BoundingSphere {
 }
 
 impl Geometry {
+    /// Objects of these meshes.
+    pub fn new(meshes: Vec<Mesh>, objects: Vec<Object>) -> Self {
+        Self { meshes, objects, facets: Vec::new() }
+    }
+
     /// What is known of the surface at `hit`, found with `ray`.
     pub fn interaction(&self, ray: &Ray, hit: &Hit) -> Interaction {
         let object = self.object(hit.object);
-        let s = match object.shape {
-            Shape::Mesh(mesh) => surface::at(self.mesh(mesh), object, hit.primitive, hit.b),
-            Shape::Sphere => sphere::at_hit(object, ray, hit.t),
-            Shape::Disk => disk::at_hit(object, ray, hit.t),
-        };
-        let SurfacePoint { p, p_error, ng, ns, uv, dpdu, dpdv } = s;
-        Interaction { p, p_error, ng, ns, uv, dpdu, dpdv, object: hit.object, primitive: hit.primitive }
+        match object.shape {
+            Shape::Mesh(mesh) => {
+                let mesh = self.mesh(mesh);
+                // Apart from the others, which come through memory and are copied.
+                match self.facet(hit.object, hit.primitive) {
+                    Some(facet) => facet.at(mesh, object, hit.primitive, hit.b).seen_as(hit),
+                    None => surface::at(mesh, object, hit.primitive, hit.b).seen_as(hit),
+                }
+            }
+            Shape::Sphere => sphere::at_hit(object, ray, hit.t).seen_as(hit),
+            Shape::Disk => disk::at_hit(object, ray, hit.t).seen_as(hit),
+        }
+    }
+
+    #[inline]
+    fn facet(&self, object: ObjectId, triangle: u32) -> Option<&Facet> {
+        self.facets.get(object.0 as usize)?.get(triangle as usize)
+    }
+
+    /// The point with weights `b` of a mesh's triangle.
+    #[inline]
+    fn on_mesh(&self, mesh: MeshId, id: ObjectId, triangle: u32, b: [f32; 2]) -> SurfacePoint {
+        let (mesh, object) = (self.mesh(mesh), self.object(id));
+        match self.facet(id, triangle) {
+            Some(facet) => facet.at(mesh, object, triangle, b),
+            None => surface::at(mesh, object, triangle, b),
+        }
     }
 
     /// A point uniform by area on one primitive: a triangle of a mesh object, or the whole sphere or disk.
+    #[inline]
     pub fn sample_area(&self, id: ObjectId, primitive: u32, u: Vec2) -> SurfaceSample {
         let object = self.object(id);
         let s = match object.shape {
             Shape::Mesh(mesh) => {
                 // Turk 1990, "Generating Random Points in Triangles".
                 let root = u.x.sqrt();
-                surface::at(self.mesh(mesh), object, primitive, [root * (1.0 - u.y), root * u.y])
+                self.on_mesh(mesh, id, primitive, [root * (1.0 - u.y), root * u.y])
             }
             Shape::Sphere => sphere::at(object, sphere::uniform_direction(u)),
             Shape::Disk => {
@@ -154,14 +180,7 @@ impl Geometry {
                 disk::at(object, x, y)
             }
         };
-        let pdf_area = self.pdf_area(id, primitive);
-        SurfaceSample { p: s.p, p_error: s.p_error, ng: s.ng, uv: s.uv, pdf_area }
-    }
-
-    /// Density of [`Geometry::sample_area`] with respect to area; 0 on a primitive without area.
-    pub fn pdf_area(&self, object: ObjectId, primitive: u32) -> f32 {
-        let pdf = 1.0 / self.area(object, primitive);
-        if pdf.is_finite() { pdf } else { 0.0 }
+        SurfaceSample { p: s.p, p_error: s.p_error, ng: s.ng, uv: s.uv }
     }
 
     /// World-space area of a primitive.
@@ -222,10 +241,12 @@ impl Geometry {
         BoundingSphere { centre, radius: (reach.length() as f32).next_up() }
     }
 
+    #[inline]
     fn object(&self, id: ObjectId) -> &Object {
         &self.objects[id.0 as usize]
     }
 
+    #[inline]
     fn mesh(&self, id: MeshId) -> &Mesh {
         &self.meshes[id.0 as usize]
     }

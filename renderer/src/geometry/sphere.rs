@@ -68,7 +68,8 @@ pub(super) fn at(object: &Object, outward: DVec3) -> SurfacePoint {
         let frame = Frame::from_normal(ng);
         (frame.s * radius, frame.t * radius)
     };
-    SurfacePoint { p, p_error: rounding(p), ng, ns: ng, uv, dpdu, dpdv }
+    let frame = Frame::from_normal_tangent(ng, dpdu);
+    SurfacePoint { p, p_error: rounding(p), ng, frame, uv, dpdu, dpdv }
 }
 
 /// Direction uniform on the sphere for `u` in the unit square.

@@ -5,7 +5,7 @@
 //! near the lamp, since what a lamp gives to points chosen without regard to it has no finite variance.
 
 use super::{UnitContext, tile};
-use crate::bsdf::{ShadingPoint, Transport};
+use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
 use crate::math::{Anchor, Ray, Vec2, Vec3};
@@ -63,11 +63,12 @@ struct Leg {
 }
 
 /// Where a path scatters.
-struct Here {
-    anchor: Anchor,
+#[derive(Clone, Copy)]
+struct Here<'a> {
+    anchor: &'a Anchor,
     /// The object whose surface it is on; none in a medium.
     object: Option<ObjectId>,
-    scattering: Scattering,
+    scattering: &'a Scattering,
 }
 
 /// One path, through media or not.
@@ -98,10 +99,39 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
                 self.add(&mut total, beta, scattered.unwrap_or(Rgb::ZERO));
             }
             self.sampler.start_vertex(edges);
-            let event = self.fly(&mut leg, &mut beta);
-            let Some(here) = self.arrive(&event, &leg, beta, edges, &mut total) else { break };
+            // The parts of `Here` are made in their places: every copy would wait for what was just written.
+            let (anchor, object, scattering);
+            if MEDIA {
+                match self.fly(&mut leg, &mut beta) {
+                    Event::Surface(hit) => {
+                        scattering = self.arrive(&hit, &leg, beta, edges, &mut total);
+                        (anchor, object) = (hit.anchor(), Some(hit.object));
+                    }
+                    Event::Scatter { p, medium } => {
+                        let medium = scene.media[medium.0 as usize];
+                        scattering = Scattering::Medium(MediumPoint { medium, wo: -leg.ray.d });
+                        (anchor, object) = (Anchor::free(p), None);
+                    }
+                    Event::Escaped => {
+                        self.escape(&leg, beta, edges, &mut total);
+                        break;
+                    }
+                }
+            } else {
+                self.counters.rays += 1;
+                let hit = scene.accel.intersect(&leg.ray);
+                let Some(hit) = &hit else {
+                    self.escape(&leg, beta, edges, &mut total);
+                    break;
+                };
+                let hit = scene.geometry.interaction(&leg.ray, hit);
+                scattering = self.arrive(&hit, &leg, beta, edges, &mut total);
+                anchor = hit.anchor();
+                object = Some(hit.object);
+            }
+            let here = Here { anchor: &anchor, object, scattering: &scattering };
             if let (1, Some(aov)) = (edges, self.aov.as_deref_mut()) {
-                aov.add(&tile::shown(&here.scattering, &lens, &here.anchor));
+                aov.add(&tile::shown(here.scattering, &lens, here.anchor));
             }
             if edges == self.c.max_depth {
                 break;
@@ -109,24 +139,24 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
 
             // Connect to a light.
             if !here.scattering.is_delta_only() && self.c.carried.has(edges + 1) {
-                let direct = self.next_event(&here, &leg);
+                let direct = self.next_event(here, &leg);
                 self.add(&mut total, beta, direct);
             }
 
             // Go on in a direction drawn from the BSDF or the phase function.
-            let uc = self.sampler.next_1d();
-            let u = self.sampler.next_2d();
-            let Some(s) = here.scattering.sample(uc, u, Transport::Radiance) else { break };
-            beta *= here.scattering.weight(&s);
+            let (uc, u) = here.scattering.numbers(&mut self.sampler);
+            let sample = here.scattering.sample(uc, u, Transport::Radiance);
+            let Some(s) = &sample else { break };
+            beta *= here.scattering.weight(s);
             if beta.is_black() || !beta.is_valid() {
                 self.counters.admit(beta);
                 break;
             }
             eta_scale *= s.eta * s.eta;
             leg.ray = here.anchor.ray(s.wi);
-            leg.arrival = Arrival { from: here.anchor, pdf: s.pdf, alone: s.lobe.delta };
+            leg.arrival = Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta };
             if MEDIA {
-                leg.around = scene.beside(here.object, &here.anchor, s.wi, &leg.around);
+                leg.around = scene.beside(here.object, here.anchor, s.wi, &leg.around);
             }
 
             // End the path by chance when it carries little.
@@ -143,17 +173,11 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         total
     }
 
-    /// Goes on to what the ray meets.
-    #[inline]
+    /// Goes on through media to what the ray meets.
     fn fly(&mut self, leg: &mut Leg, beta: &mut Rgb) -> Event {
-        let scene = self.c.scene;
-        if !MEDIA {
-            self.counters.rays += 1;
-            let hit = scene.accel.intersect(&leg.ray);
-            return hit.map_or(Event::Escaped, |hit| Event::Surface(scene.geometry.interaction(&leg.ray, &hit)));
-        }
         let u = self.sampler.next_1d();
-        let flight = scene.fly(&Channels::by_throughput(*beta), &leg.ray, leg.around, u, &mut self.counters.rays);
+        let channels = Channels::by_throughput(*beta);
+        let flight = self.c.scene.fly(&channels, &leg.ray, leg.around, u, &mut self.counters.rays);
         *beta *= flight.weight;
         leg.around = flight.around;
         leg.tau = flight.tau;
@@ -161,31 +185,23 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         flight.event
     }
 
-    /// Adds the light that is met there; what scatters the path, if it may go on.
-    #[inline]
-    fn arrive(&mut self, event: &Event, leg: &Leg, beta: Rgb, edges: u32, total: &mut Rgb) -> Option<Here> {
+    /// Adds the light of the surface that is met; what scatters the path there.
+    #[inline(always)]
+    fn arrive(&mut self, hit: &Interaction, leg: &Leg, beta: Rgb, edges: u32, total: &mut Rgb) -> Scattering {
         let scene = self.c.scene;
         let wo = -leg.ray.d;
-        match event {
-            Event::Escaped => {
-                if self.c.carried.has(edges) {
-                    self.add(total, beta, self.escaped(&leg.ray, &leg.arrival));
-                }
-                None
-            }
-            Event::Surface(hit) => {
-                if self.c.carried.has(edges) {
-                    self.add(total, beta, self.emitted(hit, wo, &leg.arrival));
-                }
-                let material = scene.objects[hit.object.0 as usize].material;
-                let shading = ShadingPoint::new(&scene.materials, &scene.textures, material, hit, wo);
-                let scattering = Scattering::Surface(shading);
-                Some(Here { anchor: hit.anchor(), object: Some(hit.object), scattering })
-            }
-            Event::Scatter { p, medium } => {
-                let scattering = Scattering::Medium(MediumPoint { medium: scene.media[medium.0 as usize], wo });
-                Some(Here { anchor: Anchor::free(*p), object: None, scattering })
-            }
+        if self.c.carried.has(edges) {
+            self.add(total, beta, self.emitted(hit, wo, &leg.arrival));
+        }
+        let material = scene.objects[hit.object.0 as usize].material;
+        Scattering::at_surface(&scene.materials, &scene.textures, material, hit, wo)
+    }
+
+    /// Adds the light of the sky.
+    #[inline]
+    fn escape(&mut self, leg: &Leg, beta: Rgb, edges: u32, total: &mut Rgb) {
+        if self.c.carried.has(edges) {
+            self.add(total, beta, self.escaped(&leg.ray, &leg.arrival));
         }
     }
 
@@ -229,14 +245,14 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
     }
 
     /// Light that comes straight from a chosen light.
-    fn next_event(&mut self, here: &Here, leg: &Leg) -> Rgb {
+    fn next_event(&mut self, here: Here, leg: &Leg) -> Rgb {
         let scene = self.c.scene;
-        let uc = self.sampler.next_1d();
-        let u = self.sampler.next_2d();
+        let (uc, u) = self.sampler.next_3();
         let Some(choice) = self.c.selector.sample(uc) else { return Rgb::ZERO };
         let light = &scene.lights[choice.index];
         let Here { anchor: from, object, scattering } = here;
-        let Some(li) = light.sample_li(&scene.light_context(), from.p, choice.u, u) else { return Rgb::ZERO };
+        let sample = light.sample_li(&scene.light_context(), from.p, choice.u, u);
+        let Some(li) = &sample else { return Rgb::ZERO };
         let (f, pdf_scattering) = scattering.eval_pdf(li.wi, Transport::Radiance);
         if f.is_black() {
             return Rgb::ZERO;
@@ -248,8 +264,8 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             f * li.radiance * (cos * weight / pdf)
         };
         if MEDIA {
-            let around = scene.beside(*object, from, li.wi, &leg.around);
-            let Some(through) = scene.transmission(from, &(&li).into(), around, &mut self.counters.rays) else {
+            let around = scene.beside(object, from, li.wi, &leg.around);
+            let Some(through) = scene.transmission(from, &li.into(), around, &mut self.counters.rays) else {
                 return Rgb::ZERO;
             };
             let direct = weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
@@ -289,8 +305,8 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
 }
 
 /// Weight of a point at which a flight was scattered by itself, against its choice near `lamp`.
-fn not_near_lamp(here: &Here, leg: &Leg, lamp: Vec3) -> f32 {
-    match (&here.scattering, Equiangular::new(leg.ray.o, leg.ray.d, lamp)) {
+fn not_near_lamp(here: Here, leg: &Leg, lamp: Vec3) -> f32 {
+    match (here.scattering, Equiangular::new(leg.ray.o, leg.ray.d, lamp)) {
         (Scattering::Medium(point), Some(near)) => {
             let t = (here.anchor.p - leg.ray.o).length();
             power_heuristic(point.medium.scatter_density(leg.tau), near.pdf(t))

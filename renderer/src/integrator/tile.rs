@@ -86,20 +86,26 @@ impl<'a> Sums<'a> {
     /// Adds a sample to all pixels whose filter covers it.
     #[inline]
     fn spread(&mut self, raster: Vec2, value: Rgb) {
-        for (x, y, weight) in self.filter.weights(raster).iter() {
-            self.add(x, y, weight, value);
+        let value = value.to_array().map(f64::from);
+        let footprint = self.filter.weights(raster);
+        for (x, y, wy, columns) in footprint.rows() {
+            let place = self.place(x, y);
+            for (to, wx) in self.sums[place..place + columns.len()].iter_mut().zip(columns) {
+                add(to, wx * wy, value);
+            }
         }
     }
 
     #[inline]
     fn add(&mut self, x: u32, y: u32, weight: f32, value: Rgb) {
-        let place = (y - self.covered.y0) * self.covered.width() + x - self.covered.x0;
-        let to = &mut self.sums[place as usize];
-        let weight = f64::from(weight);
-        to[0] += weight * f64::from(value.r);
-        to[1] += weight * f64::from(value.g);
-        to[2] += weight * f64::from(value.b);
-        to[3] += weight;
+        let place = self.place(x, y);
+        add(&mut self.sums[place], weight, value.to_array().map(f64::from));
+    }
+
+    /// Where a pixel's sums are.
+    #[inline]
+    fn place(&self, x: u32, y: u32) -> usize {
+        ((y - self.covered.y0) * self.covered.width() + x - self.covered.x0) as usize
     }
 
     fn finish(self, samples: u32, aovs: Vec<Aov>) -> TileSums {
@@ -107,6 +113,16 @@ impl<'a> Sums<'a> {
         let sums = self.sums.iter().map(|s| Rgb::new(s[0] as f32, s[1] as f32, s[2] as f32)).collect();
         TileSums { rect: self.rect, covered: self.covered, samples, sums, weights, aovs }
     }
+}
+
+/// Adds a weighted value and its weight.
+#[inline]
+fn add(to: &mut [f64; 4], weight: f32, [r, g, b]: [f64; 3]) {
+    let weight = f64::from(weight);
+    to[0] += weight * r;
+    to[1] += weight * g;
+    to[2] += weight * b;
+    to[3] += weight;
 }
 
 /// What the first vertex of a path, at `at`, shows in the auxiliary images of a camera at `lens`.

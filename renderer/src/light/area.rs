@@ -47,6 +47,7 @@ impl AreaLight {
     }
 
     /// A uniform point of the surface.
+    #[inline(always)]
     fn sample_surface(&self, ctx: &LightContext, uc: f32, u: Vec2) -> SurfaceSample {
         let primitive = self.primitives.as_ref().map_or(0, |table| table.sample(uc).index as u32);
         ctx.geometry.sample_area(self.object, primitive, u)

@@ -1,9 +1,12 @@
 //! What scatters at a vertex, surface or medium, in one interface.
 
-use crate::bsdf::{DirectionSample, Lobe, ShadingPoint, Transport};
+use crate::bsdf::{DirectionSample, Lobe, Material, MaterialId, ShadingPoint, Transport};
+use crate::geometry::Interaction;
 use crate::math::{Vec2, Vec3};
 use crate::medium::Medium;
+use crate::sampling::Sampler;
 use crate::spectrum::Rgb;
+use crate::texture::Texture;
 
 /// A point of a medium that scatters, seen from `wo`. The scattering coefficient is in the weight of the flight that came here; what is
 /// left is the phase function.
@@ -34,6 +37,17 @@ pub enum Scattering {
 }
 
 impl Scattering {
+    /// Evaluates `material` at `hit`, seen from `wo` ([`ShadingPoint::new`]).
+    pub fn at_surface(
+        materials: &[Material],
+        textures: &[Texture],
+        material: MaterialId,
+        hit: &Interaction,
+        wo: Vec3,
+    ) -> Self {
+        Self::Surface(ShadingPoint::new(materials, textures, material, hit, wo))
+    }
+
     /// Draws a direction: `uc` chooses between lobes, `u` the direction. `None` absorbs the path.
     #[inline]
     pub fn sample(&self, uc: f32, u: Vec2, mode: Transport) -> Option<DirectionSample> {
@@ -98,6 +112,25 @@ impl Scattering {
             Self::Surface(shading) => shading.is_delta_only(),
             Self::Medium(_) => false,
         }
+    }
+
+    /// Whether `sample` looks at `uc`.
+    #[inline]
+    fn chooses(&self) -> bool {
+        match self {
+            Self::Surface(shading) => shading.bsdf.chooses(),
+            Self::Medium(_) => false,
+        }
+    }
+
+    /// What `sample` needs.
+    #[inline]
+    pub fn numbers(&self, sampler: &mut impl Sampler) -> (f32, Vec2) {
+        if self.chooses() {
+            return sampler.next_3();
+        }
+        sampler.skip_1d();
+        (0.0, sampler.next_2d())
     }
 
     /// Rough share of light that is scattered, in [0, 1].

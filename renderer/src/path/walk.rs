@@ -4,7 +4,7 @@ use super::mis::{Heuristic, delta_density};
 use super::scattering::{MediumPoint, Scattering};
 use super::vertex::{Edge, Escape, LightStart, Subpath, Vertex, VertexKind};
 use super::{Counters, roulette};
-use crate::bsdf::{DirectionSample, ShadingPoint, Transport};
+use crate::bsdf::{DirectionSample, Transport};
 use crate::camera::Camera;
 use crate::geometry::Interaction;
 use crate::light::LightSelector;
@@ -119,11 +119,12 @@ impl Tracer<'_> {
             return self.arrive_through_media(path, sampler.next_1d(), head, mode);
         }
         self.counters.rays += 1;
-        let Some(hit) = self.scene.accel.intersect(&head.ray) else {
+        let hit = self.scene.accel.intersect(&head.ray);
+        let Some(hit) = &hit else {
             path.escape = Some(Escape { w: head.ray.d, beta: head.beta, pdf: head.pdf, tau: Rgb::ZERO });
             return false;
         };
-        let hit = self.scene.geometry.interaction(&head.ray, &hit);
+        let hit = self.scene.geometry.interaction(&head.ray, hit);
         let edge = self.edge_to(path, &hit.anchor(), &head.ray);
         self.meet(path, &hit, edge, head, mode);
         true
@@ -166,7 +167,7 @@ impl Tracer<'_> {
         let scene = self.scene;
         let wo = -head.ray.d;
         let info = &scene.objects[hit.object.0 as usize];
-        let shading = ShadingPoint::new(&scene.materials, &scene.textures, info.material, hit, wo);
+        let scattering = Scattering::at_surface(&scene.materials, &scene.textures, info.material, hit, wo);
         let emitted = match (mode, info.light) {
             (Transport::Radiance, Some(index)) => {
                 Some((index, scene.lights[index as usize].radiance(&scene.light_context(), hit, wo)))
@@ -174,7 +175,7 @@ impl Tracer<'_> {
             _ => None,
         };
         path.vertices.push(Vertex {
-            kind: VertexKind::Inner(Scattering::Surface(shading)),
+            kind: VertexKind::Inner(scattering),
             anchor: hit.anchor(),
             beta: head.beta,
             pdf_fwd: head.pdf * edge.forward,
@@ -191,11 +192,12 @@ impl Tracer<'_> {
     /// scaled by the square of; `None` where the walk ends.
     #[inline]
     fn depart(&self, path: &mut Subpath, sampler: &mut impl Sampler, head: &mut Head, mode: Transport) -> Option<f32> {
-        let (uc, u) = (sampler.next_1d(), sampler.next_2d());
         let last = path.vertices.last()?;
         let VertexKind::Inner(at) = &last.kind else { return None };
-        let s = at.sample(uc, u, mode)?;
-        head.beta *= at.weight(&s);
+        let (uc, u) = at.numbers(sampler);
+        let sample = at.sample(uc, u, mode);
+        let s = sample.as_ref()?;
+        head.beta *= at.weight(s);
         if mode == Transport::Importance {
             head.beta *= at.adjoint_correction(s.wi);
         }
@@ -210,7 +212,7 @@ impl Tracer<'_> {
         if self.scene.features.has_media() {
             head.around = last.around_towards(self.scene, s.wi);
         }
-        self.leave(path, &s, mode);
+        self.leave(path, s, mode);
         Some(if mode == Transport::Radiance { s.eta } else { 1.0 })
     }
 

@@ -24,16 +24,35 @@ impl SobolSampler {
         Self { key, reversed_index: index.reverse_bits(), pair: 0 }
     }
 
-    /// The shuffled index for the next pair and two more words for its scrambles.
+    /// What shuffles the index for the next pair, and two words for its scrambles.
     #[inline]
-    fn next_pair(&mut self) -> (u32, u32, u32) {
+    fn next_words(&mut self) -> (u32, u32, u32) {
         let shuffle = stream_bits(self.key, self.pair as u64);
         let scramble = mix64(shuffle);
         self.pair += 1;
-        // Shuffling is an Owen scramble of the index itself: aligned blocks of 2^k indices stay together.
-        let index = laine_karras(self.reversed_index, shuffle as u32).reverse_bits();
-        (index, scramble as u32, (scramble >> 32) as u32)
+        (shuffle as u32, scramble as u32, (scramble >> 32) as u32)
     }
+
+    /// The index as `shuffle` shuffles it, by an Owen scramble of the index itself: aligned blocks of 2^k indices stay together.
+    /// Digits from the highest bit.
+    #[inline]
+    fn shuffled(&self, shuffle: u32) -> u32 {
+        laine_karras(self.reversed_index, shuffle)
+    }
+}
+
+/// Both numbers with their bits in the other order: two cost no more than one.
+#[inline]
+const fn reverse_both(a: u32, b: u32) -> (u32, u32) {
+    let reversed = (((b as u64) << 32) | a as u64).reverse_bits();
+    ((reversed >> 32) as u32, reversed as u32)
+}
+
+/// The point with a shuffled index in the first two Sobol dimensions, scrambled.
+#[inline]
+fn point(index: u32, scramble_x: u32, scramble_y: u32) -> Vec2 {
+    let (x, y) = reverse_both(laine_karras(index, scramble_x), laine_karras(pascal(index), scramble_y));
+    Vec2::new(unit_f32(x), unit_f32(y))
 }
 
 impl Sampler for SobolSampler {
@@ -44,16 +63,27 @@ impl Sampler for SobolSampler {
 
     #[inline]
     fn next_1d(&mut self) -> f32 {
-        let (index, scramble, _) = self.next_pair();
-        unit_f32(laine_karras(index, scramble).reverse_bits())
+        let (shuffle, scramble, _) = self.next_words();
+        unit_f32(laine_karras(self.shuffled(shuffle).reverse_bits(), scramble).reverse_bits())
     }
 
     #[inline]
     fn next_2d(&mut self) -> Vec2 {
-        let (index, scramble_x, scramble_y) = self.next_pair();
-        let x = laine_karras(index, scramble_x).reverse_bits();
-        let y = laine_karras(pascal(index), scramble_y).reverse_bits();
-        Vec2::new(unit_f32(x), unit_f32(y))
+        let (shuffle, scramble_x, scramble_y) = self.next_words();
+        point(self.shuffled(shuffle).reverse_bits(), scramble_x, scramble_y)
+    }
+
+    #[inline]
+    fn next_3(&mut self) -> (f32, Vec2) {
+        let (shuffle, scramble, _) = self.next_words();
+        let (shuffle_xy, scramble_x, scramble_y) = self.next_words();
+        let (index, index_xy) = reverse_both(self.shuffled(shuffle), self.shuffled(shuffle_xy));
+        (unit_f32(laine_karras(index, scramble).reverse_bits()), point(index_xy, scramble_x, scramble_y))
+    }
+
+    #[inline]
+    fn skip_1d(&mut self) {
+        self.pair += 1;
     }
 }
 
@@ -84,6 +114,20 @@ const fn pascal(mut x: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_together_are_those_one_after_the_other() {
+        for index in [0, 1, 5, 0x1234_5678] {
+            let mut one = SobolSampler::new(3, 0, 17, index);
+            let mut other = one;
+            for _ in 0..4 {
+                assert_eq!(one.next_3(), (other.next_1d(), other.next_2d()));
+                one.skip_1d();
+                other.next_1d();
+            }
+            assert_eq!(one, other);
+        }
+    }
 
     /// Every aligned block of 2^m points has one point in each elementary interval of area 2^-m.
     #[test]

@@ -105,7 +105,7 @@ impl Scene {
                 Err(message) => diagnostics.error(file, shape.name.clone(), message, ""),
             }
         }
-        let mut geometry = Geometry { meshes: builder.meshes, objects };
+        let mut geometry = Geometry::new(builder.meshes, objects);
         let described: Vec<Option<f64>> = shapes
             .iter()
             .zip(&geometry.objects)

@@ -14,13 +14,14 @@ use std::sync::Arc;
 
 /// A hit whose shading normal differs from the geometric one by `tilt` degrees.
 fn hit(tilt: f32) -> Interaction {
+    let dpdu = Vec3::new(2.0, 0.5, 0.0);
     Interaction {
         p: Vec3::ZERO,
         p_error: Vec3::ZERO,
         ng: Vec3::Z,
-        ns: direction(tilt, 0.3),
+        frame: Frame::from_normal_tangent(direction(tilt, 0.3), dpdu),
         uv: Vec2::splat(0.5),
-        dpdu: Vec3::new(2.0, 0.5, 0.0),
+        dpdu,
         dpdv: Vec3::new(-0.3, 1.0, 0.1),
         object: ObjectId(0),
         primitive: 0,
@@ -163,7 +164,7 @@ fn world_space_directions_follow_the_density() {
 #[test]
 fn normal_maps_bend_the_frame() {
     let hit = hit(0.0);
-    let surface = Frame::from_normal_tangent(hit.ns, hit.dpdu);
+    let surface = hit.frame;
     let texel = Vec3::new(0.5, -0.3, 0.6).normalize();
     let bent = point(BENT_GLTF, &hit, Vec3::Z).frame.n;
     assert!(bent.distance(surface.to_world(texel)) < 1e-5, "{bent}");
@@ -186,7 +187,7 @@ fn senseless_normal_maps_are_ignored() {
     for texel in [[0.5, 0.5, 0.5], [0.5, 0.5, 0.0], [1.0, 0.5, 0.5], [f32::NAN, 0.5, 1.0], [0.5, 0.5, f32::INFINITY]] {
         let textures = [flat(Rgb::from(texel))];
         let s = ShadingPoint::new(&materials(), &textures, BENT_GLTF, &hit, direction(30.0, 1.0));
-        assert!(s.frame.n.distance(hit.ns) < 1e-6, "{texel:?}: {:?}", s.frame);
+        assert!(s.frame.n.distance(hit.frame.n) < 1e-6, "{texel:?}: {:?}", s.frame);
         assert!(s.eval(direction(40.0, 4.0), Transport::Radiance).is_valid());
     }
 }
@@ -196,7 +197,7 @@ fn senseless_normal_maps_are_ignored() {
 fn adjoint_correction_is_veachs() {
     let hit = hit(25.0);
     let (wo, wi) = (direction(40.0, 1.0), direction(65.0, 4.0));
-    let expected = (wo.dot(hit.ns) * wi.dot(hit.ng) / (wo.dot(hit.ng) * wi.dot(hit.ns))).abs();
+    let expected = (wo.dot(hit.frame.n) * wi.dot(hit.ng) / (wo.dot(hit.ng) * wi.dot(hit.frame.n))).abs();
     assert!((point(RED, &hit, wo).adjoint_correction(wi) / expected - 1.0).abs() < 1e-5);
     assert!((point(RED, &self::hit(0.0), wo).adjoint_correction(wi) - 1.0).abs() < 1e-5);
     assert_eq!(point(RED, &hit, Vec3::X).adjoint_correction(wi), 0.0);

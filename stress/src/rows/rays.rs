@@ -43,7 +43,7 @@ impl World {
         if !probe.holds(objects.is_some(), || "a transform is refused".into()) {
             return None;
         }
-        let geometry = Geometry { meshes, objects: objects? };
+        let geometry = Geometry::new(meshes, objects?);
         match Accel::build(&geometry) {
             Ok(accel) => Some(Self { geometry, accel }),
             Err(e) => {

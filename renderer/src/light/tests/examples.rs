@@ -9,7 +9,7 @@ use crate::texture::{Image, RgbParam, Texture, TextureId, UvTransform};
 
 fn geometry(mesh: Option<Mesh>, shape: Shape, m: DAffine3, flip_normals: bool) -> Geometry {
     let to_world = Transform::new(m).unwrap();
-    Geometry { meshes: mesh.into_iter().collect(), objects: vec![Object { shape, to_world, flip_normals }] }
+    Geometry::new(mesh.into_iter().collect(), vec![Object { shape, to_world, flip_normals }])
 }
 
 fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {

@@ -41,7 +41,7 @@ fn sampling_the_light_equals_looking_everywhere() {
 /// An emitter of radiance 1 (two-sided), placed by `m`.
 fn emitter(name: &'static str, shape: Shape, m: DAffine3) -> Example {
     let objects = vec![Object { shape, to_world: Transform::new(m).unwrap(), flip_normals: false }];
-    let geometry = Geometry { meshes: vec![square()], objects };
+    let geometry = Geometry::new(vec![square()], objects);
     let emission = Emission { radiance: RgbParam::Const(Rgb::ONE), two_sided: true };
     let light = Light::area(&geometry, ObjectId(0), &emission).unwrap();
     Example::new(name, geometry, Vec::new(), light)

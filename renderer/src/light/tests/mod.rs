@@ -37,7 +37,7 @@ impl Example {
     pub fn free(name: &'static str, light: Light) -> Self {
         let to_world = Transform::new(DAffine3::from_scale(DVec3::splat(2.0 / 3f64.sqrt()))).unwrap();
         let objects = vec![Object { shape: Shape::Sphere, to_world, flip_normals: false }];
-        Self::new(name, Geometry { meshes: Vec::new(), objects }, Vec::new(), light)
+        Self::new(name, Geometry::new(Vec::new(), objects), Vec::new(), light)
     }
 
     pub fn ctx(&self) -> LightContext<'_> {

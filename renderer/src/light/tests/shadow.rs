@@ -13,7 +13,7 @@ const EMISSION: Emission = Emission { radiance: RgbParam::Const(Rgb::ONE), two_s
 
 fn scene(shape: Shape, m: DAffine3) -> Geometry {
     let objects = vec![Object { shape, to_world: Transform::new(m).unwrap(), flip_normals: false }];
-    Geometry { meshes: vec![square()], objects }
+    Geometry::new(vec![square()], objects)
 }
 
 /// No light hides itself, at any scale, place, distance and angle.
