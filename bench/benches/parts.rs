@@ -18,7 +18,7 @@ use renderer::sampling::warp;
 use renderer::scene::Scene;
 use renderer::scene::bundle::DiskSource;
 use renderer::spectrum::Rgb;
-use renderer::texture::{Filter, Image, Texels, Texture, UvTransform, Wrap};
+use renderer::texture::{Filter, Image, Samples, Texels, Texture, UvTransform, Wrap};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -105,9 +105,23 @@ fn bsdf_sample(bencher: Bencher, name: &str) {
 fn texture_eval(bencher: Bencher, filter: &Filter) {
     let mut random = Random(5);
     let texels = (0..1024 * 1024).map(|_| Rgb::splat(random.next())).collect();
-    let image = Arc::new(Image { width: 1024, height: 1024, texels: Texels::Float(texels) });
-    let uv = UvTransform::IDENTITY;
-    let texture = Texture::Image { image, wrap: [Wrap::Repeat; 2], filter: *filter, uv, scale: Rgb::ONE };
+    look_up(bencher, *filter, Texels::Float(texels));
+}
+
+/// The same from samples of 8 bits.
+#[divan::bench(args = [Filter::Nearest, Filter::Linear])]
+fn texture_eval_bytes(bencher: Bencher, filter: &Filter) {
+    static VALUES: [f32; 256] = [0.5; 256];
+    let mut random = Random(5);
+    let data: Vec<u8> = (0..3 * 1024 * 1024).map(|_| (256.0 * random.next()) as u8).collect();
+    let samples = Samples::new(data, 3, &VALUES);
+    look_up(bencher, *filter, samples.map_or_else(|| unreachable!("they are whole texels"), Texels::Bytes));
+}
+
+fn look_up(bencher: Bencher, filter: Filter, texels: Texels) {
+    let mut random = Random(6);
+    let image = Arc::new(Image { width: 1024, height: 1024, texels });
+    let texture = Texture::Image { image, wrap: [Wrap::Repeat; 2], filter, uv: UvTransform::IDENTITY, scale: Rgb::ONE };
     let points: Vec<Vec2> = (0..ITEMS).map(|_| Vec2::new(random.next(), random.next()) * 4.0).collect();
     bencher.counter(ItemsCount::new(ITEMS)).bench(|| points.iter().map(|p| texture.eval(*p).luminance()).sum::<f32>());
 }

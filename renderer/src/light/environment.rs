@@ -92,8 +92,8 @@ impl EnvironmentLight {
     fn lookup(&self, taps: &Taps) -> (Rgb, f32) {
         let mut radiance = Rgb::ZERO;
         let mut density = 0.0;
-        for (k, texel) in self.image.texels.get(taps.index).into_iter().enumerate() {
-            let texel = positive(texel) * self.scale * taps.weight[k];
+        for k in 0..4 {
+            let texel = positive(self.image.texels.at(taps.index[k])) * self.scale * taps.weight[k];
             radiance += texel;
             density += texel.luminance() * self.sines[taps.row[k]];
         }

@@ -50,8 +50,7 @@ impl Image {
     /// The texel in column `x` of row `y`.
     #[inline]
     pub fn texel(&self, x: u32, y: u32) -> Rgb {
-        let [texel] = self.texels.get([self.index(x, y)]);
-        texel
+        self.texels.at(self.index(x, y))
     }
 
     /// Where the texel in column `x` of row `y` is.
@@ -69,11 +68,8 @@ impl Image {
     fn bilinear(&self, uv: Vec2, wrap: [Wrap; 2]) -> Rgb {
         let ([x0, x1], fx) = texel_pair(uv.x, self.width, wrap[0]);
         let ([y0, y1], fy) = texel_pair(uv.y, self.height, wrap[1]);
-        // All at once: how texels are kept is told only once.
-        let [a, b, c, d] =
-            self.texels.get([self.index(x0, y0), self.index(x1, y0), self.index(x0, y1), self.index(x1, y1)]);
-        let row = |left: Rgb, right: Rgb| left * (1.0 - fx) + right * fx;
-        row(a, b) * (1.0 - fy) + row(c, d) * fy
+        let at = [self.index(x0, y0), self.index(x1, y0), self.index(x0, y1), self.index(x1, y1)];
+        self.texels.blend(at, [fx, fy])
     }
 }
 

@@ -10,19 +10,19 @@ pub enum Texels {
     /// Single precision, from float formats: 12 bytes each.
     Float(Vec<Rgb>),
     /// From 8-bit samples: 1 or 3 bytes each.
-    Bytes(Samples<u8>),
+    Bytes(Samples<u8, 256>),
     /// From 16-bit samples: 2 or 6 bytes each.
-    Words(Samples<u16>),
+    Words(Samples<u16, 65_536>),
     /// Those of another picture, each replaced by its luminance.
     Luminance(Arc<Image>),
 }
 
-/// Integer samples, one or three a texel, and what they stand for.
+/// Integer samples, one or three a texel, and what they stand for: `LEVELS` values, as many as `T` has.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Samples<T> {
+pub struct Samples<T, const LEVELS: usize> {
     data: Vec<T>,
     grey: bool,
-    values: &'static [f32],
+    values: &'static [f32; LEVELS],
 }
 
 impl From<Vec<Rgb>> for Texels {
@@ -57,32 +57,52 @@ impl Texels {
         }
     }
 
-    /// The linear values of some of them.
+    /// The linear value of one.
     #[inline]
-    pub fn get<const N: usize>(&self, at: [usize; N]) -> [Rgb; N] {
+    pub fn at(&self, i: usize) -> Rgb {
         match self {
-            Self::Float(texels) => at.map(|i| texels[i]),
-            Self::Bytes(samples) => samples.get(at),
-            Self::Words(samples) => samples.get(at),
-            Self::Luminance(image) => image.texels.get(at).map(|t| Rgb::splat(t.luminance())),
+            Self::Float(texels) => texels[i],
+            Self::Bytes(samples) => samples.at(i),
+            Self::Words(samples) => samples.at(i),
+            Self::Luminance(image) => grey_of(image, i),
         }
     }
 
     /// The linear values of all.
     pub fn iter(&self) -> impl Iterator<Item = Rgb> {
-        (0..self.len()).map(|i| {
-            let [texel] = self.get([i]);
-            texel
-        })
+        (0..self.len()).map(|i| self.at(i))
+    }
+
+    /// Bilinear interpolation of two texels of a row and two of the next; `f` are the weights of the second column and row.
+    #[inline]
+    pub(super) fn blend(&self, at: [usize; 4], f: [f32; 2]) -> Rgb {
+        // How texels are kept is told once for all four.
+        match self {
+            Self::Float(texels) => blend(|i| texels[i], at, f),
+            Self::Bytes(samples) if samples.grey => blend(|i| samples.grey(i), at, f),
+            Self::Bytes(samples) => blend(|i| samples.colour(i), at, f),
+            other => blend(|i| other.at(i), at, f),
+        }
     }
 }
 
-impl<T: Copy + Into<usize>> Samples<T> {
+/// Apart, so that lookups, which it calls again, stay small enough to be inlined.
+#[inline(never)]
+fn grey_of(image: &Image, i: usize) -> Rgb {
+    Rgb::splat(image.texels.at(i).luminance())
+}
+
+#[inline]
+fn blend(texel: impl Fn(usize) -> Rgb, at: [usize; 4], f: [f32; 2]) -> Rgb {
+    let row = |left, right| texel(left) * (1.0 - f[0]) + texel(right) * f[0];
+    row(at[0], at[1]) * (1.0 - f[1]) + row(at[2], at[3]) * f[1]
+}
+
+impl<T: Copy + Into<usize>, const LEVELS: usize> Samples<T, LEVELS> {
     /// Interleaved samples of 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGB, alpha) channels; alpha is dropped. Sample `i` stands for
-    /// `values[i]`. `None` where there are other numbers of samples or channels, or samples without a value.
-    pub fn new(mut data: Vec<T>, channels: usize, values: &'static [f32]) -> Option<Self> {
-        let valued = values.len() >= 1 << (8 * size_of::<T>());
-        if !valued || !(1..=4).contains(&channels) || !data.len().is_multiple_of(channels) {
+    /// `values[i]`. `None` where there are other numbers of samples or channels.
+    pub fn new(mut data: Vec<T>, channels: usize, values: &'static [f32; LEVELS]) -> Option<Self> {
+        if !(1..=4).contains(&channels) || !data.len().is_multiple_of(channels) {
             return None;
         }
         if channels.is_multiple_of(2) {
@@ -101,15 +121,19 @@ impl<T: Copy + Into<usize>> Samples<T> {
     }
 
     #[inline]
-    fn get<const N: usize>(&self, at: [usize; N]) -> [Rgb; N] {
-        let value = |sample: T| self.values[sample.into()];
-        if self.grey {
-            return at.map(|i| Rgb::splat(value(self.data[i])));
-        }
-        at.map(|i| {
-            let texel = &self.data[3 * i..3 * i + 3];
-            Rgb::new(value(texel[0]), value(texel[1]), value(texel[2]))
-        })
+    fn at(&self, i: usize) -> Rgb {
+        if self.grey { self.grey(i) } else { self.colour(i) }
+    }
+
+    #[inline]
+    fn grey(&self, i: usize) -> Rgb {
+        Rgb::splat(self.values[self.data[i].into()])
+    }
+
+    #[inline]
+    fn colour(&self, i: usize) -> Rgb {
+        let texel = &self.data[3 * i..3 * i + 3];
+        Rgb::new(self.values[texel[0].into()], self.values[texel[1].into()], self.values[texel[2].into()])
     }
 }
 
@@ -120,13 +144,10 @@ mod tests {
     use crate::texture::{Filter, Texture, UvTransform, Wrap};
 
     /// Values of no pattern for 16-bit samples, and the first 256 for 8-bit ones.
-    fn values() -> &'static [f32] {
+    fn values<const LEVELS: usize>() -> &'static [f32; LEVELS] {
         static VALUES: std::sync::OnceLock<Vec<f32>> = std::sync::OnceLock::new();
-        VALUES.get_or_init(|| (0..65_536u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 8) as f32 * 3.1e-8).collect())
-    }
-
-    fn kept(texels: Option<Samples<u8>>) -> Texels {
-        Texels::Bytes(texels.unwrap())
+        let value = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 * 3.1e-8;
+        VALUES.get_or_init(|| (0..65_536).map(value).collect()).first_chunk().unwrap()
     }
 
     #[test]
@@ -136,7 +157,7 @@ mod tests {
         let words = || data.iter().map(|v| u16::from(*v) * 251).collect::<Vec<u16>>();
         let cut = |channels: u32| data[..(width * height * channels) as usize].to_vec();
         let mut stores: Vec<Texels> =
-            (1..=4).map(|n| kept(Samples::new(cut(n), n as usize, &values()[..256]))).collect();
+            (1..=4).map(|n| Texels::Bytes(Samples::new(cut(n), n as usize, values()).unwrap())).collect();
         stores.push(Texels::Words(Samples::new(words(), 4, values()).unwrap()));
         let coloured = Image { width, height, texels: stores[2].clone() };
         stores.push(Texels::Luminance(Arc::new(coloured)));
@@ -170,12 +191,9 @@ mod tests {
     }
 
     #[test]
-    fn samples_without_a_texel_or_a_value_are_refused() {
-        assert!(Samples::<u8>::new(vec![0; 6], 3, &values()[..256]).is_some());
-        assert!(Samples::<u8>::new(vec![0; 7], 3, &values()[..256]).is_none());
-        assert!(Samples::<u8>::new(vec![0; 6], 6, &values()[..256]).is_none());
-        assert!(Samples::<u8>::new(vec![0; 6], 0, &values()[..256]).is_none());
-        assert!(Samples::<u8>::new(vec![0; 6], 3, &values()[..255]).is_none());
-        assert!(Samples::<u16>::new(vec![0; 6], 3, &values()[..65_535]).is_none());
+    fn samples_without_a_texel_are_refused() {
+        let fits = |count, channels| Samples::new(vec![0u8; count], channels, values::<256>()).is_some();
+        assert!(fits(6, 3) && fits(6, 2) && fits(0, 1));
+        assert!(!fits(7, 3) && !fits(6, 6) && !fits(6, 0));
     }
 }

@@ -62,19 +62,20 @@ fn srgb_to_linear(v: f64) -> f64 {
     if v <= 0.040_45 { v / 12.92 } else { pow64((v + 0.055) / 1.055, 2.4) }
 }
 
-/// Linear values of all samples of `levels` levels: by table, since a power per texel is slow.
-fn table(levels: u32, kind: ImageKind) -> Vec<f32> {
-    let top = f64::from(levels - 1);
+/// Linear values of all samples of `LEVELS` levels: by table, since a power per texel is slow.
+fn table<const LEVELS: usize>(kind: ImageKind) -> Box<[f32; LEVELS]> {
     let decode = |v: f64| if kind == ImageKind::Srgb { srgb_to_linear(v) } else { v };
-    (0..levels).map(|i| decode(f64::from(i) / top) as f32).collect()
+    let mut values = Box::new([0.0; LEVELS]);
+    values.iter_mut().enumerate().for_each(|(i, v)| *v = decode(i as f64 / (LEVELS - 1) as f64) as f32);
+    values
 }
 
-fn table8(kind: ImageKind) -> &'static [f32] {
-    static TABLES: [OnceLock<Vec<f32>>; 2] = [OnceLock::new(), OnceLock::new()];
-    TABLES[kind as usize].get_or_init(|| table(256, kind))
+fn table8(kind: ImageKind) -> &'static [f32; 256] {
+    static TABLES: [OnceLock<Box<[f32; 256]>>; 2] = [OnceLock::new(), OnceLock::new()];
+    TABLES[kind as usize].get_or_init(|| table(kind))
 }
 
-fn table16(kind: ImageKind) -> &'static [f32] {
-    static TABLES: [OnceLock<Vec<f32>>; 2] = [OnceLock::new(), OnceLock::new()];
-    TABLES[kind as usize].get_or_init(|| table(65_536, kind))
+fn table16(kind: ImageKind) -> &'static [f32; 65_536] {
+    static TABLES: [OnceLock<Box<[f32; 65_536]>>; 2] = [OnceLock::new(), OnceLock::new()];
+    TABLES[kind as usize].get_or_init(|| table(kind))
 }
