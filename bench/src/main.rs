@@ -1,6 +1,7 @@
 //! Figures: rays per second, samples per second, error against time, what the farm costs; whether integrators agree and
 //! whether the errors that they tell are true. See `README.md` beside this crate.
 
+mod ablation;
 mod agree;
 mod auto;
 mod coverage;
@@ -39,6 +40,8 @@ enum What {
     Farm(farm::Args),
     /// Error times cost of path, bdpt and mmlt, and whether `auto` chooses the best of them.
     Auto(auto::Args),
+    /// What each skip saves, and what unused features cost.
+    Ablation(ablation::Args),
     /// Whether all integrators render the same pictures; exit status 1 when they don't.
     Agree(agree::Args),
     /// Whether the errors that pictures tell of themselves are true; exit status 1 when they aren't.
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
         What::Report(args) => report::run(args).map(figures),
         What::Farm(args) => farm::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Auto(args) => auto::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
+        What::Ablation(args) => ablation::run(args).map(|r| figures(show(cli.json, &r, ToString::to_string))),
         What::Agree(args) => agree::run(args).map(|r| (show(cli.json, &r, agree::table), r.passed)),
         What::Coverage(args) => coverage::run(args).map(|r| (show(cli.json, &r, ToString::to_string), r.passed())),
     };

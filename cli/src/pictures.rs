@@ -8,7 +8,8 @@ use renderer::film::exr::{self, Provenance};
 use renderer::film::{Counters, ErrorSummary, MergedImage, png};
 use renderer::integrator::IntegratorKind;
 use renderer::integrator::mmlt::ChainStats;
-use renderer::job::{Choice, LocalOutcome, RenderSettings};
+use renderer::job::{Choice, LocalOutcome, RenderSettings, skipped};
+use renderer::scene::SceneFeatures;
 use renderer::scene::bundle::Digest;
 use serde::Serialize;
 use std::fmt;
@@ -77,14 +78,23 @@ pub struct Summary {
     #[serde(flatten)]
     counters: Counters,
     chains: ChainStats,
+    /// What was not computed.
+    skipped: Vec<String>,
     exr: String,
     png: String,
 }
 
 impl Summary {
     /// Of a job of this process.
-    pub fn new(outcome: &LocalOutcome, settings: &RenderSettings, scene: Digest, seconds: f64, saved: &Saved) -> Self {
+    pub fn new(
+        outcome: &LocalOutcome,
+        settings: &RenderSettings,
+        (scene, features): (Digest, &SceneFeatures),
+        seconds: f64,
+        saved: &Saved,
+    ) -> Self {
         let image = &outcome.image;
+        let rendered = outcome.choice.as_ref().map(|c| settings.rendered_by(c.integrator, None));
         Self {
             event: "done",
             interrupted: outcome.interrupted,
@@ -100,6 +110,7 @@ impl Summary {
             error: image.error,
             counters: image.counters,
             chains: outcome.chains,
+            skipped: skipped(features, rendered.as_ref().unwrap_or(settings)),
             exr: saved.exr.display().to_string(),
             png: saved.png.display().to_string(),
         }
@@ -144,6 +155,9 @@ impl fmt::Display for Summary {
         write!(f, ", {dropped} contributions dropped")?;
         if dropped > 0 {
             write!(f, " ({} not finite, {} negative)", c.non_finite, c.negative)?;
+        }
+        if !self.skipped.is_empty() {
+            write!(f, "\nskipped: {}", self.skipped.join("; "))?;
         }
         write!(f, "\n{}\n{}", self.exr, self.png)
     }

@@ -20,6 +20,8 @@ fn a_render_writes_both_pictures_and_sums_up() {
     assert_eq!((&done["width"], &done["height"], &done["spp"]), (&48.into(), &32.into(), &8.0.into()));
     assert_eq!((&done["non_finite"], &done["negative"]), (&0.into(), &0.into()));
     assert!(done["error"]["relative"].as_f64().unwrap() > 0.0 && done["first_preview_s"].as_f64().unwrap() < 2.0);
+    let skipped = done["skipped"].as_array().unwrap();
+    assert!(skipped.iter().any(|s| s == "participating media"), "{skipped:?}");
     let picture = lab.picture("scene.exr");
     let metadata = picture.metadata.clone().unwrap();
     assert_eq!(metadata.scene.to_string(), done["scene"].as_str().unwrap());

@@ -60,7 +60,8 @@ pub fn run(args: Args, console: &Console) -> Outcome {
         return Err(Failure::Interrupted);
     }
     let saved = pictures.save(&outcome.image, &settings.provenance(manifest.digest(), outcome.choice.as_ref()))?;
-    let summary = Summary::new(&outcome, &settings, manifest.digest(), seconds, &saved);
+    let about = (manifest.digest(), &loaded.scene.features);
+    let summary = Summary::new(&outcome, &settings, about, seconds, &saved);
     let summary = summary.with_first_preview(preview.first());
     console.result(&summary, &summary);
     match saved.failure {

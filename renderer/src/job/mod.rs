@@ -13,6 +13,7 @@ mod planner;
 mod rendering;
 mod run;
 mod settings;
+mod skips;
 mod unit;
 
 pub use auto::{Choice, Outcome};
@@ -24,4 +25,5 @@ pub use planner::{Learned, Planner};
 pub use rendering::FoldError;
 pub use run::{Stop, UnitError, render_strategies, run_unit};
 pub use settings::{Budget, RenderOptions, RenderSettings, SettingsError};
+pub use skips::skipped;
 pub use unit::{Unit, UnitKind, UnitResult};
