@@ -54,7 +54,7 @@ pub fn counted(what: &str) -> Result<(), String> {
     }
     let skip = skips::find(name)?;
     let arm = if arm == "with" { Arm::With } else { Arm::Without };
-    let scene = render::scene(skip, arm)?;
+    let scene = render::scene(skip, skip.scene, arm)?;
     if count > 0 {
         render::render(skip, &scene, arm, count, 1)?;
     }

@@ -17,6 +17,9 @@ pub struct Args {
     /// Names of skips [default: all]
     #[arg(long, value_delimiter = ',')]
     skips: Vec<String>,
+    /// Another scene in place of each skip's own; instructions are not counted then
+    #[arg(long)]
+    scene: Option<String>,
     /// Processor seconds of a render, about
     #[arg(long, default_value_t = 1.0)]
     seconds: f64,
@@ -36,7 +39,7 @@ pub struct Args {
 pub struct Row {
     name: &'static str,
     what: &'static str,
-    scene: &'static str,
+    scene: String,
     integrator: &'static str,
     /// Samples or mutations a pixel.
     count: u32,
@@ -76,7 +79,11 @@ pub fn run(args: &Args) -> Result<Report, String> {
         count::counted(only)?;
         return Ok(report);
     }
-    let counts = if args.uncounted { Err("instructions were not counted".into()) } else { count::available() };
+    let counts = if args.uncounted || args.scene.is_some() {
+        Err("instructions were not counted".into())
+    } else {
+        count::available()
+    };
     report.note = counts.err();
     for skip in chosen(&args.skips)? {
         let row = row(skip, args, report.note.is_none())?;
@@ -97,7 +104,9 @@ fn chosen(names: &[String]) -> Result<Vec<&'static Skip>, String> {
 }
 
 fn row(skip: &'static Skip, args: &Args, counted: bool) -> Result<Row, String> {
-    let (with, without) = (render::scene(skip, Arm::With)?, render::scene(skip, Arm::Without)?);
+    let file = args.scene.as_deref().unwrap_or(skip.scene);
+    let scene = |arm| render::scene(skip, file, arm);
+    let (with, without) = (scene(Arm::With)?, scene(Arm::Without)?);
     let count = render::count_for(skip, &with, args.seconds)?;
     let mut samples: [Vec<Sample>; 2] = Default::default();
     for round in 0..args.rounds.max(2) {
@@ -114,7 +123,7 @@ fn row(skip: &'static Skip, args: &Args, counted: bool) -> Result<Row, String> {
     Ok(Row {
         name: skip.name,
         what: skip.what,
-        scene: skip.scene,
+        scene: file.into(),
         integrator: skip.integrator.name(),
         count,
         instructions,

@@ -44,8 +44,8 @@ fn load(file: &str) -> Result<Scene, String> {
 }
 
 /// The scene of a render.
-pub fn scene(skip: &Skip, arm: Arm) -> Result<Scene, String> {
-    let mut scene = load(skip.scene)?;
+pub fn scene(skip: &Skip, file: &str, arm: Arm) -> Result<Scene, String> {
+    let mut scene = load(file)?;
     if let (Without::Scene(change), Arm::Without) = (&skip.without, arm) {
         change(&mut scene);
     }

@@ -90,8 +90,16 @@ pub const SKIPS: &[Skip] = &[
     },
     Skip {
         name: "unseen-lights",
-        what: "light paths from lights that reach little of what is seen",
-        scene: "scenes/lamps.toml",
+        what: "most shadow rays to lights that reach little of what is seen",
+        scene: "scenes/stress/hidden-lights.toml",
+        integrator: Path,
+        settings: AS_THEY_ARE,
+        without: Without::Plan(|p| p.light_weights.clear()),
+    },
+    Skip {
+        name: "unseen-emitters",
+        what: "most light paths from such lights",
+        scene: "scenes/stress/hidden-lights.toml",
         integrator: Light,
         settings: AS_THEY_ARE,
         without: Without::Plan(|p| p.light_weights.clear()),
@@ -143,7 +151,7 @@ mod tests {
     fn every_skip_can_be_done_without() {
         for skip in SKIPS {
             let picture = |arm| {
-                let scene = scene(skip, arm).unwrap();
+                let scene = scene(skip, skip.scene, arm).unwrap();
                 render(skip, &scene, arm, 16, 1).unwrap().picture
             };
             assert_ne!(picture(Arm::With), picture(Arm::Without), "{}", skip.name);

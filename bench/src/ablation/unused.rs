@@ -31,6 +31,11 @@ const FEATURES: &[(&str, &str)] = &[
          material = \"unused\"\ncenter = [0.0, 1.0, 40.0]\nradius = 0.1\n",
     ),
     (
+        "a block behind the camera",
+        "[materials.unused]\nkind = \"diffuse\"\nreflectance = 0.5\n[[shapes]]\nname = \"unused\"\nkind = \"cube\"\n\
+         material = \"unused\"\ntransform = [{ scale = [0.1, 0.1, 0.1] }, { translate = [0.0, 1.0, 40.0] }]\n",
+    ),
+    (
         "a metal ball behind the camera",
         "[materials.unused]\nkind = \"conductor\"\nmetal = \"Cu\"\nalpha = 0.2\n[[shapes]]\nname = \"unused\"\nkind = \"sphere\"\n\
          material = \"unused\"\ncenter = [0.0, 1.0, 40.0]\nradius = 0.1\n",

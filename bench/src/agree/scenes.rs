@@ -23,7 +23,7 @@ pub struct Case {
 }
 
 /// Shipped scenes: name, and whether light tracing sees everything.
-const STRESS: [(&str, bool); 19] = [
+const STRESS: [(&str, bool); 20] = [
     ("glossy-cornell", true),
     ("mirror-box", false),
     ("glass-caustic", false),
@@ -34,6 +34,7 @@ const STRESS: [(&str, bool); 19] = [
     ("light-behind-glass", false),
     ("camera-in-glass", false),
     ("many-lights", true),
+    ("hidden-lights", true),
     ("media-fog-spot", true),
     ("media-door", true),
     ("media-glass-caustic", false),

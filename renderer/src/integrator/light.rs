@@ -5,6 +5,7 @@
 
 use super::UnitContext;
 use crate::film::{Counters, SplatSums};
+use crate::light::LightLessons;
 use crate::math::Vec2;
 use crate::path::{Subpath, Tracer};
 use crate::sampling::{Sampler, SobolSampler};
@@ -16,7 +17,7 @@ const LIGHT_STREAM: u64 = 1 << 40;
 /// The block of numbers of the light seen directly lies beyond those of all walks.
 const EMISSION: u32 = 1 << 20;
 
-/// Traces light paths `paths` of the replicate; returns the luminance splatted per light, `None` when stopped.
+/// Traces light paths `paths` of the replicate; `None` when stopped. Returns what they taught of the lights.
 ///
 /// The sum of the splats over N paths, divided by N, is the image.
 pub fn trace_paths(
@@ -27,7 +28,7 @@ pub fn trace_paths(
 ) -> Option<Vec<f64>> {
     counters.samples += paths.end - paths.start;
     let tracer = c.tracer(Some(c.rr_depth));
-    let mut film = Film { c, tracer, splats, light_sums: vec![0.0; c.scene.lights.len()] };
+    let mut film = Film { c, tracer, splats, lessons: LightLessons::new(c.scene.lights.len()) };
     let mut walk = Subpath::default();
     for path in paths {
         if path % 256 == 0 && (c.stopped)() {
@@ -38,15 +39,14 @@ pub fn trace_paths(
         film.scattered(&mut walk, &mut sampler);
     }
     counters.add(&film.tracer.counters);
-    Some(film.light_sums)
+    Some(film.lessons.into_sums())
 }
 
 struct Film<'a> {
     c: &'a UnitContext<'a>,
     tracer: Tracer<'a>,
     splats: &'a mut SplatSums,
-    /// Luminance splatted per light.
-    light_sums: Vec<f64>,
+    lessons: LightLessons,
 }
 
 impl Film<'_> {
@@ -60,6 +60,7 @@ impl Film<'_> {
         let (uc, u) = (sampler.next_1d(), sampler.next_2d());
         let lens_u = self.tracer.lens_numbers(sampler);
         let Some(choice) = self.c.selector.sample(uc) else { return };
+        self.lessons.tried(choice.index, choice.pmf, 1);
         let light = &self.c.scene.lights[choice.index];
         let lens = view.camera.generate_ray(Vec2::ZERO, lens_u).o;
         let Some(li) = light.sample_li(&self.c.scene.light_context(), lens, choice.u, u) else { return };
@@ -81,6 +82,7 @@ impl Film<'_> {
         if limit < 2 {
             return;
         }
+        let before = self.tracer.counters.rays;
         self.tracer.light_walk(walk, sampler, limit);
         let Some(start) = walk.light else { return };
         sampler.start_vertex(EMISSION + 1);
@@ -92,6 +94,7 @@ impl Film<'_> {
                 self.splat(start.index, raster, path.value, |tracer| tracer.is_free(&path).then_some(Rgb::ONE));
             }
         }
+        self.lessons.tried(start.index, self.c.selector.pmf(start.index), 1 + self.tracer.counters.rays - before);
     }
 
     /// Adds a contribution at a raster position to all pixels whose filter covers it, or what of it `arrives`.
@@ -110,6 +113,6 @@ impl Film<'_> {
             self.splats.add(x, y, value * weight);
             total += weight;
         }
-        self.light_sums[light] += f64::from(value.luminance() * total);
+        self.lessons.gave(light, self.c.selector.pmf(light), value * total.sqrt());
     }
 }

@@ -8,6 +8,7 @@ use super::{UnitContext, tile};
 use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
+use crate::light::LightLessons;
 use crate::math::{Anchor, Ray, Vec2, Vec3};
 use crate::medium::{Channels, Equiangular, passing_probability};
 use crate::path::{MediumPoint, Scattering, power_heuristic, roulette};
@@ -16,14 +17,20 @@ use crate::scene::{Enclosures, Event, Target};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
-/// Renders samples `samples` of each pixel of a tile; `None` when stopped.
-pub fn render_tile(c: &UnitContext<'_>, rect: Rect, samples: Range<u32>, counters: &mut Counters) -> Option<TileSums> {
+/// Renders samples `samples` of each pixel of a tile; `None` when stopped. What next-event estimation finds teaches of the lights.
+pub fn render_tile(
+    c: &UnitContext<'_>,
+    rect: Rect,
+    samples: Range<u32>,
+    lessons: &mut LightLessons,
+    counters: &mut Counters,
+) -> Option<TileSums> {
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
     // Which of the two it is is decided once for the tile: scenes without media run no code for them.
     if c.scene.features.has_media() {
-        render::<true>(c, rect, samples, counters)
+        render::<true>(c, rect, samples, lessons, counters)
     } else {
-        render::<false>(c, rect, samples, counters)
+        render::<false>(c, rect, samples, lessons, counters)
     }
 }
 
@@ -31,10 +38,12 @@ fn render<const MEDIA: bool>(
     c: &UnitContext<'_>,
     rect: Rect,
     samples: Range<u32>,
+    lessons: &mut LightLessons,
     counters: &mut Counters,
 ) -> Option<TileSums> {
     tile::render(c, rect, samples, |s| {
-        Walk::<_, MEDIA> { c, counters: &mut *counters, sampler: s.sampler, aov: s.aov }.radiance(s.ray)
+        let (lessons, counters) = (&mut *lessons, &mut *counters);
+        Walk::<_, MEDIA> { c, lessons, counters, sampler: s.sampler, aov: s.aov }.radiance(s.ray)
     })
 }
 
@@ -74,6 +83,7 @@ struct Here<'a> {
 /// One path, through media or not.
 struct Walk<'a, 'b, S, const MEDIA: bool> {
     c: &'a UnitContext<'a>,
+    lessons: &'b mut LightLessons,
     counters: &'b mut Counters,
     sampler: S,
     aov: Option<&'b mut Aov>,
@@ -138,9 +148,12 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             }
 
             // Connect to a light.
-            if !here.scattering.is_delta_only() && self.c.carried.has(edges + 1) {
-                let direct = self.next_event(here, &leg);
+            if !here.scattering.is_delta_only()
+                && self.c.carried.has(edges + 1)
+                && let Some((light, direct)) = self.next_event(here, &leg)
+            {
                 self.add(&mut total, beta, direct);
+                self.lessons.gave(light, self.c.selector.pmf(light), beta * direct);
             }
 
             // Go on in a direction drawn from the BSDF or the phase function.
@@ -244,18 +257,19 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         radiance * power_heuristic(arrival.pdf, pdf_light)
     }
 
-    /// Light that comes straight from a chosen light.
-    fn next_event(&mut self, here: Here, leg: &Leg) -> Rgb {
+    /// Light that comes straight from a chosen light, and which.
+    fn next_event(&mut self, here: Here, leg: &Leg) -> Option<(usize, Rgb)> {
         let scene = self.c.scene;
         let (uc, u) = self.sampler.next_3();
-        let Some(choice) = self.c.selector.sample(uc) else { return Rgb::ZERO };
+        let choice = self.c.selector.sample(uc)?;
+        self.lessons.tried(choice.index, choice.pmf, 1);
         let light = &scene.lights[choice.index];
         let Here { anchor: from, object, scattering } = here;
         let sample = light.sample_li(&scene.light_context(), from.p, choice.u, u);
-        let Some(li) = &sample else { return Rgb::ZERO };
+        let li = sample.as_ref()?;
         let (f, pdf_scattering) = scattering.eval_pdf(li.wi, Transport::Radiance);
         if f.is_black() {
-            return Rgb::ZERO;
+            return None;
         }
         let cos = scattering.abs_cos(li.wi);
         let pdf = li.pdf * choice.pmf;
@@ -265,18 +279,16 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         };
         if MEDIA {
             let around = scene.beside(object, from, li.wi, &leg.around);
-            let Some(through) = scene.transmission(from, &li.into(), around, &mut self.counters.rays) else {
-                return Rgb::ZERO;
-            };
+            let through = scene.transmission(from, &li.into(), around, &mut self.counters.rays)?;
             let direct = weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
-            return direct * light.position().map_or(1.0, |lamp| not_near_lamp(here, leg, lamp));
+            return Some((choice.index, direct * light.position().map_or(1.0, |lamp| not_near_lamp(here, leg, lamp))));
         }
         let contribution = weighted(pdf_scattering);
         if contribution.is_black() {
-            return Rgb::ZERO;
+            return None;
         }
         self.counters.rays += 1;
-        if scene.accel.occluded(&li.shadow_ray(from)) { Rgb::ZERO } else { contribution }
+        (!scene.accel.occluded(&li.shadow_ray(from))).then_some((choice.index, contribution))
     }
 
     /// Light of a lamp without extent that is scattered once into the flight ahead, at a point chosen near the lamp.

@@ -68,7 +68,7 @@ impl UnitResult {
                 film + FOUND_WORDS * lengths * u64::from(end - start) + 2 * sums
             }
         };
-        1024 + 8 * u64::from(lights) + 4 * floats + 4 * floats / 250
+        1024 + 16 * u64::from(lights) + 4 * floats + 4 * floats / 250
     }
 
     /// Reads what [`UnitResult::encode`] wrote, for `unit` on a film of `width * height` pixels and a scene of `lights` lights.
@@ -83,8 +83,8 @@ impl UnitResult {
         let paths = next()?;
         let counters = Counters { samples: next()?, rays: next()?, non_finite: next()?, negative: next()? };
         let n = r.u32().ok_or(fail("too short"))? as usize;
-        if n > lights {
-            return Err(fail("more light sums than the scene has lights"));
+        if n > 2 * lights {
+            return Err(fail("more light sums than two for each of the scene's lights"));
         }
         let light_sums =
             (0..n).map(|_| r.u64().map(f64::from_bits)).collect::<Option<Vec<_>>>().ok_or(fail("too short"))?;

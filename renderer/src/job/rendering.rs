@@ -8,6 +8,7 @@ use super::unit::{UnitKind, UnitResult};
 use crate::film::{AovSum, Counters, GroupFilm, MergedImage, SplatSums};
 use crate::integrator::IntegratorKind;
 use crate::integrator::mmlt::ChainStats;
+use crate::light::selection_weights;
 use std::io::{self, Write};
 
 /// A result that can't be folded.
@@ -170,8 +171,6 @@ impl Rendering {
             }
             (UnitKind::Paths { start, end }, None, Some(splats)) if fits(splats) && result.paths == end - start => {
                 group.add_splats(splats, result.paths);
-                self.light_sums.resize(self.light_sums.len().max(result.light_sums.len()), 0.0);
-                self.light_sums.iter_mut().zip(&result.light_sums).for_each(|(to, from)| *to += from);
             }
             (UnitKind::Bootstrap { .. }, None, splats) if splats.as_ref().is_none_or(fits) => {
                 let added = self.metropolis.add_bootstrap(&self.settings, &self.plan, &unit, result);
@@ -196,6 +195,8 @@ impl Rendering {
             UnitKind::Chains { .. } => &mut self.spent.chains,
         };
         spent.add(&result.counters);
+        self.light_sums.resize(self.light_sums.len().max(result.light_sums.len()), 0.0);
+        self.light_sums.iter_mut().zip(&result.light_sums).for_each(|(to, from)| *to += from);
         Ok(())
     }
 
@@ -238,7 +239,7 @@ impl Rendering {
         }
         let share = self.planner.size(self.done_spp) / self.settings.replicates;
         let learned = Learned {
-            light_weights: self.learned_weights(),
+            light_weights: selection_weights(&self.light_sums),
             threshold: self.learned_threshold(),
             ranges: adaptive::deal(&self.settings, &self.groups, self.done_spp, share),
         };
@@ -266,16 +267,6 @@ impl Rendering {
         let met = self.image().error.is_some_and(|e| e.upper95 <= target);
         self.checkpoints_met = if met { self.checkpoints_met + 1 } else { 0 };
         self.checkpoints_met >= 2
-    }
-
-    /// Selection weights of the lights: the square root of the power that reached the film would be best for equal variances;
-    /// the contribution itself is the safer choice for few samples. Lights that gave nothing keep a share (see `LightSelector`).
-    fn learned_weights(&self) -> Vec<f32> {
-        let total: f64 = self.light_sums.iter().sum();
-        if self.light_sums.len() < 2 || !(total > 0.0) {
-            return Vec::new();
-        }
-        self.light_sums.iter().map(|s| (s / total) as f32).collect()
     }
 
     /// Samples per pixel folded in completed passes.

@@ -6,14 +6,11 @@ use crate::film::{Rect, SplatSums};
 use crate::integrator::mmlt::{self, ChainTask, Mismatch};
 use crate::integrator::strategies::{self, Strategies};
 use crate::integrator::{self, Carried, IntegratorKind, UnitContext, View};
-use crate::light::LightSelector;
+use crate::light::LightLessons;
 use crate::scene::Scene;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Share of the light paths that learned selection still deals to all lights alike.
-const UNIFORM_SHARE: f32 = 0.2;
 
 /// Asks units to end early; a stopped unit has no result.
 #[derive(Debug, Default)]
@@ -93,7 +90,7 @@ fn run(
     let (settings, pass) = (plan.settings(settings), plan.own_pass());
     let Some(view) = View::new(scene, settings.width, settings.height, settings.filter) else { return Ok(None) };
     let learned = (plan.light_weights.len() == scene.lights.len() && !scene.lights.is_empty())
-        .then(|| LightSelector::defensive(&plan.light_weights, UNIFORM_SHARE));
+        .then(|| scene.selector.mixed(&plan.light_weights));
     let (max_depth, carried) = depths(settings);
     let context = UnitContext {
         scene,
@@ -218,7 +215,11 @@ fn run_tile(
         result.tile = render(c, rect, samples, &mut splats, &mut result.counters);
         result.splats = Some(splats);
     } else {
-        result.tile = integrator::path::render_tile(c, rect, samples, &mut result.counters);
+        // The last pass has nobody to teach, and plans of chains do not heed it.
+        let learns = !plan.last && plan.chains.is_none();
+        let mut lessons = if learns { LightLessons::new(c.scene.lights.len()) } else { LightLessons::default() };
+        result.tile = integrator::path::render_tile(c, rect, samples, &mut lessons, &mut result.counters);
+        result.light_sums = lessons.into_sums();
     }
     result.tile.is_some()
 }

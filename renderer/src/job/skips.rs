@@ -13,6 +13,9 @@ pub fn skipped(features: &SceneFeatures, settings: &RenderSettings) -> Vec<Strin
     }
     let lamps = features.lights + features.delta_lights;
     match settings.integrator {
+        IntegratorKind::Path if lamps > 1 => {
+            list.push("most shadow rays to lights that reach little of the picture".into());
+        }
         IntegratorKind::Bdpt => list.push("most shadow rays of connections that carry little".into()),
         IntegratorKind::Light if lamps > 1 => {
             list.push("most light paths from lights that reach little of the picture".into())
@@ -44,9 +47,8 @@ mod tests {
             let options = RenderOptions { adaptive, ..RenderOptions::counting(integrator, 16) };
             skipped(&features, &RenderSettings::resolve(&options, &RenderDefaults::default()).unwrap())
         };
-        assert_eq!(of(IntegratorKind::Path, None), ["normal maps"]);
-        assert_eq!(of(IntegratorKind::Path, Some(true)).len(), 2);
-        for kind in [IntegratorKind::Light, IntegratorKind::Bdpt, IntegratorKind::Mmlt] {
+        assert_eq!(of(IntegratorKind::Path, Some(true)).len(), of(IntegratorKind::Path, None).len() + 1);
+        for kind in [IntegratorKind::Path, IntegratorKind::Light, IntegratorKind::Bdpt, IntegratorKind::Mmlt] {
             assert!(of(kind, None).len() > 1, "{kind:?}");
         }
     }

@@ -65,7 +65,7 @@ pub struct UnitResult {
     pub splats: Option<SplatSums>,
     /// Light paths behind `splats`.
     pub paths: u64,
-    /// Per light, the luminance that its paths splatted: the next pass's selection weights come from it. Empty for tiles.
+    /// What the next pass's selection weights come from: see `integrator::light::selection_weights`. Empty for tiles.
     pub light_sums: Vec<f64>,
     /// What a bootstrap unit found.
     pub bootstrap: Option<BootstrapSums>,

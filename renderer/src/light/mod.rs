@@ -11,6 +11,7 @@ mod constant;
 mod desc;
 mod directional;
 mod environment;
+mod learn;
 
 mod point;
 mod sample;
@@ -25,6 +26,7 @@ pub use constant::ConstantLight;
 pub use desc::{Emission, LightDesc, SpotFalloff};
 pub use directional::DirectionalLight;
 pub use environment::EnvironmentLight;
+pub use learn::{LightLessons, selection_weights};
 pub use point::PointLight;
 pub use sample::{LeSample, LiSample, LightContext, LightFlags};
 pub use select::LightSelector;
