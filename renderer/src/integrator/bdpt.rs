@@ -3,6 +3,7 @@
 
 use super::{UnitContext, tile};
 use crate::film::{Counters, Rect, SplatSums, TileSums};
+use crate::light::LightLessons;
 use crate::math::Ray;
 use crate::path::mis::Heuristic;
 use crate::path::{Always, Chance, Connection, Subpath, Tracer, VertexKind};
@@ -48,6 +49,8 @@ pub struct Bidirectional<'a> {
     threshold: f32,
     camera: Subpath,
     light: Subpath,
+    /// Lights that were selected for vertices of walks from the camera.
+    selected: u64,
 }
 
 impl<'a> Bidirectional<'a> {
@@ -55,7 +58,8 @@ impl<'a> Bidirectional<'a> {
     pub fn new(c: &UnitContext<'a>, heuristic: Heuristic) -> Self {
         let tracer = c.tracer_weighing(Some(c.rr_depth), heuristic);
         let max_depth = c.max_depth as usize;
-        Self { tracer, max_depth, threshold: c.threshold, camera: Subpath::default(), light: Subpath::default() }
+        let (camera, light) = (Subpath::default(), Subpath::default());
+        Self { tracer, max_depth, threshold: c.threshold, camera, light, selected: 0 }
     }
 
     /// What was met so far.
@@ -105,6 +109,7 @@ impl<'a> Bidirectional<'a> {
             camera_numbers.start_vertex(CONNECTIONS + t as u32);
             let (uc, u) = (camera_numbers.next_1d(), camera_numbers.next_2d());
             let mut chance = Roulette { threshold: self.threshold, numbers: camera_numbers };
+            self.selected += 1;
             let path = self.tracer.next_event(&self.camera, t, uc, u, &mut chance);
             self.finish(path, &mut chance, (1, t), sink);
             for s in 2..=from_light.min(limit - t) {
@@ -159,33 +164,50 @@ struct Film<'a> {
     c: &'a UnitContext<'a>,
     pixel: Rgb,
     splats: &'a mut SplatSums,
+    lessons: &'a mut LightLessons,
 }
 
 impl Sink for Film<'_> {
     fn add(&mut self, _s: usize, _t: usize, path: &Connection) {
-        match path.raster {
-            None => self.pixel += path.weighted(),
-            Some(raster) => self.splats.splat(&self.c.view.filter, raster, path.weighted()),
+        // As many walks start at lights as pixels have samples together.
+        let view = self.c.view;
+        let share = match path.raster {
+            None => {
+                self.pixel += path.weighted();
+                1.0
+            }
+            Some(raster) => {
+                self.splats.splat(&view.filter, raster, path.weighted());
+                1.0 / (view.width as f32 * view.height as f32)
+            }
+        };
+        if let Some(light) = path.light {
+            self.lessons.gave(light, self.c.selector.pmf(light), path.weighted() * share);
         }
     }
 }
 
 /// Renders samples `samples` of each pixel of a tile, and the splats of their walks from the lights over the whole film; `None` when
-/// stopped. As many walks start at lights as at the camera: the sum of the splats over their number is their part of the image.
+/// stopped. What is found teaches of the lights. As many walks start at lights as at the camera: the sum of the splats over their number is their part of the image.
 pub fn render_tile(
     c: &UnitContext<'_>,
     rect: Rect,
     samples: Range<u32>,
     splats: &mut SplatSums,
+    lessons: &mut LightLessons,
     counters: &mut Counters,
 ) -> Option<TileSums> {
     let mut bdpt = Bidirectional::new(c, Heuristic::Power);
-    let mut film = Film { c, pixel: Rgb::ZERO, splats };
+    let mut film = Film { c, pixel: Rgb::ZERO, splats, lessons };
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
     let tile = tile::render(c, rect, samples, |mut s| {
         let mut light_sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + s.pixel, s.index);
         film.pixel = Rgb::ZERO;
         bdpt.sample(s.ray, &mut s.sampler, &mut light_sampler, &mut film);
+        if let Some(start) = &bdpt.light.light {
+            let rays = bdpt.light.vertices.len() as u64;
+            film.lessons.tried(start.index, c.selector.pmf(start.index), rays);
+        }
         if let (Some(aov), [lens, first, ..]) = (s.aov, bdpt.camera_walk().vertices.as_slice())
             && let VertexKind::Inner(at) = &first.kind
         {
@@ -194,5 +216,6 @@ pub fn render_tile(
         film.pixel
     })?;
     counters.add(&bdpt.counters());
+    lessons.tried_any(bdpt.selected);
     Some(tile)
 }

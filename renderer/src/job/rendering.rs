@@ -235,7 +235,7 @@ impl Rendering {
 
     fn next_plan(&mut self) -> Option<PassPlan> {
         if self.settings.integrator == IntegratorKind::Mmlt {
-            return self.metropolis.next(&self.settings, &self.plan, self.done_spp, &self.groups);
+            return self.metropolis.next(&self.settings, &self.plan, self.done_spp, &self.groups, &self.light_sums);
         }
         let share = self.planner.size(self.done_spp) / self.settings.replicates;
         let learned = Learned {

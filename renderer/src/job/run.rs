@@ -122,9 +122,11 @@ fn run(
             let Some(constants) = &plan.chains else { return Ok(None) };
             // The pilot's samples are a preview.
             let mut splats = (pass == 0).then(|| SplatSums::new(settings.width, settings.height));
-            let (splat, counters) = (splats.as_mut(), &mut result.counters);
-            result.bootstrap =
-                mmlt::run_bootstrap(&context, constants, &settings.mmlt, pass, start..end, splat, counters);
+            let lessons = if pass == 0 { LightLessons::new(scene.lights.len()) } else { LightLessons::default() };
+            let pool = mmlt::PoolTask { pass, samples: start..end, splats: splats.as_mut(), lessons };
+            let made = mmlt::run_bootstrap(&context, constants, &settings.mmlt, pool, &mut result.counters);
+            (result.bootstrap, result.light_sums) =
+                made.map(|(sums, l)| (Some(sums), l.into_sums())).unwrap_or_default();
             result.splats = splats;
             result.bootstrap.is_some()
         }
@@ -204,23 +206,23 @@ fn run_tile(
     samples: Range<u32>,
     result: &mut UnitResult,
 ) -> bool {
+    // The last pass has nobody to teach, and plans of chains learn from pools.
+    let learns = !plan.last && plan.chains.is_none();
+    let mut lessons = if learns { LightLessons::new(c.scene.lights.len()) } else { LightLessons::default() };
+    let counters = &mut result.counters;
     if plan.sampling == Sampling::SplattingTiles {
         let mut splats = SplatSums::new(c.view.width, c.view.height);
         result.paths = rect.area() as u64 * u64::from(samples.end - samples.start);
-        let render = if integrator == IntegratorKind::Moments {
-            integrator::moments::render_tile
+        result.tile = if integrator == IntegratorKind::Moments {
+            integrator::moments::render_tile(c, rect, samples, &mut splats, counters)
         } else {
-            integrator::bdpt::render_tile
+            integrator::bdpt::render_tile(c, rect, samples, &mut splats, &mut lessons, counters)
         };
-        result.tile = render(c, rect, samples, &mut splats, &mut result.counters);
         result.splats = Some(splats);
     } else {
-        // The last pass has nobody to teach, and plans of chains do not heed it.
-        let learns = !plan.last && plan.chains.is_none();
-        let mut lessons = if learns { LightLessons::new(c.scene.lights.len()) } else { LightLessons::default() };
-        result.tile = integrator::path::render_tile(c, rect, samples, &mut lessons, &mut result.counters);
-        result.light_sums = lessons.into_sums();
+        result.tile = integrator::path::render_tile(c, rect, samples, &mut lessons, counters);
     }
+    result.light_sums = lessons.into_sums();
     result.tile.is_some()
 }
 

@@ -32,6 +32,12 @@ impl LightLessons {
         }
     }
 
+    /// A sample of whichever light was selected was made, so many times, each with one ray.
+    pub fn tried_any(&mut self, times: u64) {
+        let half = self.sums.len() / 2;
+        self.sums[half..].iter_mut().for_each(|rays| *rays += times as f64);
+    }
+
     /// A sample of a light, over its probability `pmf`, was added to the picture (unless it is no number).
     #[inline]
     pub fn gave(&mut self, light: usize, pmf: f32, contribution: Rgb) {

@@ -23,6 +23,8 @@ pub struct Connection {
     pub shadow: Option<Ray>,
     /// Where it falls on the picture, for t = 1: elsewhere than the camera walk's own place.
     pub raster: Option<Vec2>,
+    /// The light that was selected for it; none where the path ran into one.
+    pub light: Option<usize>,
 }
 
 impl Connection {
@@ -79,8 +81,14 @@ impl Way {
 
     /// The path that connects its ends by it.
     #[inline(always)]
-    fn connection(self, value: Rgb, weight: impl Fn(&Self) -> f64, raster: Option<Vec2>) -> Connection {
-        Connection { value: value * self.transmittance, weight: weight(&self), shadow: self.shadow, raster }
+    fn connection(
+        self,
+        value: Rgb,
+        weight: impl Fn(&Self) -> f64,
+        raster: Option<Vec2>,
+        light: Option<usize>,
+    ) -> Connection {
+        Connection { value: value * self.transmittance, weight: weight(&self), shadow: self.shadow, raster, light }
     }
 }
 
@@ -159,7 +167,7 @@ impl Tracer<'_> {
         let (index, radiance) = at.emitted.filter(|(_, radiance)| !radiance.is_black())?;
         let value = at.beta * radiance;
         if t == 2 {
-            return Some(Connection { value, weight: 1.0, shadow: None, raster: None });
+            return Some(Connection { value, weight: 1.0, shadow: None, raster: None, light: None });
         }
         let before = &camera.vertices[t - 2];
         let context = self.scene.light_context();
@@ -172,7 +180,7 @@ impl Tracer<'_> {
         let direct = solid * at.edge.forward / at.edge.passes / f64::from(pdf_pos);
         let pdf_rev = f64::from(pmf * pdf_pos);
         let weight = self.hit_weight(camera, t, pdf_rev, at.pdf_fwd, direct, f64::from(pdf_dir) * at.edge.backward);
-        Some(Connection { value, weight, shadow: None, raster: None })
+        Some(Connection { value, weight, shadow: None, raster: None, light: None })
     }
 
     /// Strategy (0, t) for a camera walk of t - 1 vertices that left the scene: one path for each light that it sees.
@@ -187,7 +195,7 @@ impl Tracer<'_> {
             let value = e.beta * radiance;
             let t = camera.vertices.len() + 1;
             if t == 2 {
-                return Some(Connection { value, weight: 1.0, shadow: None, raster: None });
+                return Some(Connection { value, weight: 1.0, shadow: None, raster: None, light: None });
             }
             let last = &camera.vertices[t - 2];
             let pdf_rev = f64::from(self.selector.pmf(index as usize) * light.pdf_li_escaped(e.w));
@@ -198,7 +206,7 @@ impl Tracer<'_> {
                 Way { shadow: None, transmittance: Rgb::ONE, tau: self.scene.features.has_media().then_some(e.tau) };
             let (out, back) = (way.density(None), way.density(last.medium()));
             let weight = self.hit_weight(camera, t, pdf_rev, e.pdf * out, 1.0, before * back);
-            Some(Connection { value, weight, shadow: None, raster: None })
+            Some(Connection { value, weight, shadow: None, raster: None, light: None })
         })
     }
 
@@ -264,7 +272,7 @@ impl Tracer<'_> {
             h.weight(light_sum, camera_sum, direct)
         };
         let way = self.way(at, li.wi, (&li).into(), value, weight, chance)?;
-        Some(way.connection(value, weight, None))
+        Some(way.connection(value, weight, None, Some(choice.index)))
     }
 
     /// Strategy (s, 1), s > 1: vertex s - 1 of the light walk seen from the lens. The contribution is that of the whole picture, to be
@@ -286,7 +294,7 @@ impl Tracer<'_> {
         let h = self.heuristic;
         let weight = |way: &Way| h.weight(light.beyond(h, s - 1, onwards * way.density(at.medium()), back), 0.0, 1.0);
         let way = self.way(at, we.wi, Target::Point(we.lens), value, weight, &mut Always)?;
-        Some(way.connection(value, weight, Some(we.raster)))
+        Some(way.connection(value, weight, Some(we.raster), light.light.map(|l| l.index)))
     }
 
     /// Strategy (s, t), s > 1, t > 1: the two ends joined.
@@ -328,6 +336,6 @@ impl Tracer<'_> {
             h.weight(light_sum, camera_sum, 1.0)
         };
         let way = self.way(z, w, Target::Point(x.anchor), value, weight, chance)?;
-        Some(way.connection(value, weight, None))
+        Some(way.connection(value, weight, None, light.light.map(|l| l.index)))
     }
 }

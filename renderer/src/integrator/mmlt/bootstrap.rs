@@ -1,6 +1,7 @@
 use super::constants::{ChainConstants, MmltOptions};
 use crate::film::{Counters, SplatSums};
 use crate::integrator::UnitContext;
+use crate::light::LightLessons;
 use crate::math::Vec2;
 use crate::path::{Always, Connection, Subpath, Tracer};
 use crate::sampling::{Discrete, IndependentSampler, PrimarySpace, Sampler, StepSizes, Stream, hash_words};
@@ -42,18 +43,30 @@ pub fn sample_key(seed: u64, pass: u32, replicate: u32, index: u32) -> u64 {
     hash_words(&[seed, POOL, u64::from(pass), u64::from(replicate), u64::from(index)])
 }
 
-/// Makes the samples `samples` of the pool of this pass and replicate; splats them, if asked to. `None` when stopped.
+/// Samples of a pool.
+pub struct PoolTask<'a> {
+    /// Number of the pass whose pool it is.
+    pub pass: u32,
+    /// Which of its samples.
+    pub samples: Range<u32>,
+    /// Where they are splatted, if at all.
+    pub splats: Option<&'a mut SplatSums>,
+    /// What they teach of the lights.
+    pub lessons: LightLessons,
+}
+
+/// Makes samples of the pool of a pass and the replicate; `None` when stopped.
 pub fn run_bootstrap(
     c: &UnitContext<'_>,
     constants: &ChainConstants,
     options: &MmltOptions,
-    pass: u32,
-    samples: Range<u32>,
-    splats: Option<&mut SplatSums>,
+    task: PoolTask<'_>,
     counters: &mut Counters,
-) -> Option<BootstrapSums> {
+) -> Option<(BootstrapSums, LightLessons)> {
+    let PoolTask { pass, samples, splats, lessons } = task;
     counters.samples += u64::from(samples.end - samples.start);
     let mut pool = Pool::new(c, constants, options, splats);
+    pool.lessons = lessons;
     for index in samples {
         if index % 64 == 0 && (c.stopped)() {
             return None;
@@ -61,7 +74,7 @@ pub fn run_bootstrap(
         pool.sample(index, sample_key(c.seed, pass, c.replicate, index));
     }
     counters.add(&pool.tracer.counters);
-    Some(pool.sums)
+    Some((pool.sums, pool.lessons))
 }
 
 /// What the paths of one length of one sample came to so far.
@@ -87,6 +100,7 @@ struct Pool<'a, 'b> {
     lengths: Vec<Length>,
     sums: BootstrapSums,
     splats: Option<&'b mut SplatSums>,
+    lessons: LightLessons,
     /// Chooses among the paths of a sample.
     choices: IndependentSampler,
 }
@@ -113,6 +127,7 @@ impl<'a, 'b> Pool<'a, 'b> {
             lengths: vec![Length::default(); constants.depths.len()],
             sums: BootstrapSums { found: Vec::new(), techniques },
             splats,
+            lessons: LightLessons::default(),
             choices: IndependentSampler::new([0]),
         }
     }
@@ -135,6 +150,11 @@ impl<'a, 'b> Pool<'a, 'b> {
         let mut numbers = self.space.stream(Stream::Connection, &self.sizes);
         let (uc, u) = (numbers.next_1d(), numbers.next_2d());
 
+        if let Some(start) = &self.light.light {
+            let rays = self.light.vertices.len() as u64;
+            self.lessons.tried(start.index, self.c.selector.pmf(start.index), rays);
+        }
+
         // All ways to join them.
         let (from_camera, from_light) = (self.camera.vertices.len(), self.light.vertices.len());
         for t in 2..=from_camera {
@@ -148,6 +168,7 @@ impl<'a, 'b> Pool<'a, 'b> {
         }
         for t in 2..=from_camera.min(longest) {
             if self.length(t).is_some() {
+                self.lessons.tried_any(1);
                 let path = self.tracer.next_event(&self.camera, t, uc, u, &mut Always);
                 self.join((1, t), path, raster);
             }
@@ -192,6 +213,10 @@ impl<'a, 'b> Pool<'a, 'b> {
             return;
         }
         if self.tracer.is_free(&path) {
+            if let Some(light) = path.light {
+                let found = value * (pixels / q);
+                self.lessons.gave(light, self.c.selector.pmf(light), found);
+            }
             self.add_with((s, t), value, raster, q);
         }
     }

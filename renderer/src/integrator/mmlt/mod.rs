@@ -23,7 +23,7 @@ mod chain;
 mod constants;
 mod evaluate;
 
-pub use bootstrap::{BootstrapSums, Found, run_bootstrap};
+pub use bootstrap::{BootstrapSums, Found, PoolTask, run_bootstrap};
 pub use chain::{ChainStart, ChainStats, ChainTask, Mismatch, run_chains};
 pub use constants::{ChainConstants, Depth, MmltOptions, TARGET_CELL};
 pub use evaluate::{Evaluator, Proposal};

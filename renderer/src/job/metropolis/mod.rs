@@ -1,6 +1,6 @@
 //! The plans of a Metropolis job, and what it has learned so far.
 //!
-//! * Pass 0 is the *pilot*: independent samples of every path length. It teaches the probabilities of the techniques and the target map,
+//! * Pass 0 is the *pilot*: independent samples of every path length. It teaches which lights to select, the probabilities of the techniques and the target map,
 //!   and is a preview; its samples count for nothing else, so nothing that it steers is biased by it.
 //! * Pass 1 makes *pools*: independent samples again, now of the target that the chains will have. A pool's mean is `b`.
 //! * Later passes run *chains* from starts drawn from the pools, and the ordinary samples of emission and direct light; where time or
@@ -20,6 +20,7 @@ use crate::job::plan::{GroupRange, Part, PassPlan, Sampling};
 use crate::job::planner::{dealt, pass_size};
 use crate::job::settings::RenderSettings;
 use crate::job::unit::{Unit, UnitKind, UnitResult};
+use crate::light::selection_weights;
 use crate::sampling::{IndependentSampler, Sampler};
 use pool::Pool;
 use std::collections::BTreeMap;
@@ -236,6 +237,7 @@ impl Metropolis {
         before: &PassPlan,
         done: u32,
         groups: &[GroupFilm],
+        light_sums: &[f64],
     ) -> Option<PassPlan> {
         let pass = before.pass + 1;
         // A depth limit may leave nothing to chains.
@@ -244,7 +246,8 @@ impl Metropolis {
             // Before there are chains, the first group's film is that of ordinary samples.
             let chains = self.learn(settings, |i| groups[0].pixel(i).0);
             let parts = Self::pools_of(settings, &Share::after(settings, 0)?);
-            return Some(plan(settings, pass, parts, chains, 0, false));
+            let light_weights = selection_weights(light_sums);
+            return Some(PassPlan { light_weights, ..plan(settings, pass, parts, chains, 0, false) });
         }
         let chains = before.chains.clone()?;
         let share = Share::after(settings, done)?;
@@ -257,7 +260,9 @@ impl Metropolis {
         if let Some(next) = next.as_ref().filter(|_| !empty) {
             parts.extend(Self::pools_of(settings, next));
         }
-        Some(plan(settings, pass, parts, chains, share.size, next.is_none()))
+        // Those of the pools, whose samples are replayed.
+        let light_weights = before.light_weights.clone();
+        Some(PassPlan { light_weights, ..plan(settings, pass, parts, chains, share.size, next.is_none()) })
     }
 
     /// The pools for a pass.
