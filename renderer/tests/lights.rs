@@ -1,0 +1,112 @@
+//! Learned selection of lights: less noise where lights are hidden, and neither the expectation nor the truth of the error changes.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
+
+use renderer::film::MergedImage;
+use renderer::integrator::IntegratorKind;
+use renderer::job::{Merger, RenderOptions, RenderSettings, Stop, run_unit};
+use renderer::scene::Scene;
+use renderer::scene::bundle::DiskSource;
+use std::path::Path;
+
+const RENDERS: u64 = 48;
+/// Student's t of some fifty degrees, two-sided 99.9 %.
+const T: f64 = 3.5;
+/// Relative variance by power over that by learned selection, at least: six of seven lights are in vain, and most of their power.
+const LEAST_GAIN: f64 = 4.0;
+
+/// A lamp, and six brighter ones that reach nothing.
+fn scene() -> Scene {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/stress/hidden-lights.toml");
+    let (source, root) = DiskSource::for_scene(&file).unwrap();
+    Scene::load(&source, &root).unwrap().0
+}
+
+fn render(scene: &Scene, kind: IntegratorKind, learns: bool, seed: u64) -> MergedImage {
+    let counting = RenderOptions::counting(kind, 32);
+    let options = RenderOptions { size: Some((32, 24)), max_depth: Some(5), seed: Some(seed), ..counting };
+    let settings = RenderSettings::resolve(&options, &scene.defaults).unwrap();
+    let mut merger = Merger::new(settings.clone());
+    loop {
+        let mut plan = merger.plan().clone();
+        if !learns {
+            plan.light_weights.clear();
+        }
+        for id in 0..plan.unit_count() {
+            let result = run_unit(scene, &settings, &plan, &plan.unit(id).unwrap(), &Stop::new()).unwrap();
+            merger.fold(id, &result).unwrap();
+        }
+        if merger.advance(false).is_none() {
+            return merger.image();
+        }
+    }
+}
+
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let var = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
+    (mean, (var / n).sqrt())
+}
+
+/// Means of the renders, and their standard error.
+fn image_means(renders: &[MergedImage]) -> (f64, f64) {
+    let of = |r: &MergedImage| r.mean.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / (3 * r.mean.len()) as f64;
+    mean_and_error(&renders.iter().map(of).collect::<Vec<_>>())
+}
+
+/// Squared relative deviations of pixels from the mean of all renders (as of one that took no part in it), and the squares of the errors that
+/// they tell: sums over the picture, by render.
+fn deviations(renders: &[MergedImage]) -> (Vec<f64>, Vec<f64>) {
+    let n = renders.len() as f64;
+    let pixels = renders[0].mean.len();
+    let mean: Vec<f64> =
+        (0..pixels).map(|i| renders.iter().map(|r| f64::from(r.mean[i][1])).sum::<f64>() / n).collect();
+    let relative = |i: usize, v: f64| v * v / (mean[i] * mean[i] + 0.01);
+    let true_of = |r: &MergedImage| {
+        (0..pixels).map(|i| relative(i, f64::from(r.mean[i][1]) - mean[i])).sum::<f64>() * n / (n - 1.0)
+    };
+    let told = |r: &MergedImage| (0..pixels).map(|i| relative(i, f64::from(r.std_error[i][1]))).sum();
+    (renders.iter().map(true_of).collect(), renders.iter().map(told).collect())
+}
+
+fn check(kind: IntegratorKind) {
+    let scene = scene();
+    let renders = |learns: bool, first: u64| -> Vec<_> {
+        (first..first + RENDERS).map(|seed| render(&scene, kind, learns, seed)).collect()
+    };
+    let (learned, power) = (renders(true, 0), renders(false, 1000));
+    let ((a, error_a), (b, error_b)) = (image_means(&learned), image_means(&power));
+    let error = (error_a * error_a + error_b * error_b).sqrt();
+    assert!((a - b).abs() < T * error, "{kind:?}: {a} against {b} by power, +- {error}");
+
+    let ((found, told), (by_power, _)) = (deviations(&learned), deviations(&power));
+    let total = |v: &[f64]| v.iter().sum::<f64>();
+    let ratio = total(&by_power) / total(&found);
+    assert!(ratio > LEAST_GAIN, "{kind:?}: variance is only {ratio} times less");
+    if kind == IntegratorKind::Path {
+        let differences: Vec<f64> = told.iter().zip(&found).map(|(t, f)| t - f).collect();
+        let (difference, error) = mean_and_error(&differences);
+        assert!(difference.abs() < T * error, "told variance less true variance: {difference} +- {error}");
+    }
+}
+
+#[test]
+fn path_learns_which_lights_to_select() {
+    check(IntegratorKind::Path);
+}
+
+#[test]
+fn light_learns_which_lights_to_select() {
+    check(IntegratorKind::Light);
+}
+
+#[test]
+fn bdpt_learns_which_lights_to_select() {
+    check(IntegratorKind::Bdpt);
+}
+
+#[test]
+fn mmlt_learns_which_lights_to_select() {
+    check(IntegratorKind::Mmlt);
+}
