@@ -46,7 +46,8 @@ fn made_up(plan: &PassPlan, unit: &Unit) -> UnitResult {
         UnitKind::Paths { start, end } => {
             result.splats = Some(splats(plan, unit));
             result.paths = end - start;
-            result.light_sums = vec![f64::from(value(3)), 1.0 / 7.0];
+            // Squares of two lights, then their rays.
+            result.light_sums = vec![f64::from(value(3)), 1.0 / 7.0, 2.0, 3.0];
         }
         UnitKind::Bootstrap { start, end } => {
             let depths = &plan.chains.as_ref().unwrap().depths;
