@@ -1,6 +1,7 @@
 //! Does `auto` choose well? For each scene, what path, bdpt, mmlt and auto cost to the same error, and auto's ratio to the best.
 
 use crate::agree::scenes;
+use crate::load;
 use renderer::integrator::IntegratorKind::{self, Auto, Bdpt, Mmlt, Path};
 use renderer::job::{Choice, LocalOptions, LocalOutcome, RenderOptions, RenderSettings, Stop, render_local};
 use renderer::math::exp64;
@@ -89,7 +90,7 @@ pub fn run(args: &Args) -> Result<Report, String> {
     };
     let mut rows = Vec::new();
     for case in scenes::chosen(&names)? {
-        let scene = case.load()?;
+        let scene = load::scene(&case.file)?;
         let started = Instant::now();
         let row = Session { name: &case.name, scene: &scene, args }.row()?;
         eprintln!("{} ({:.0} s)", row, started.elapsed().as_secs_f64());

@@ -7,6 +7,7 @@ mod auto;
 mod coverage;
 mod error;
 mod farm;
+mod load;
 mod meshes;
 mod rays;
 mod report;

@@ -1,9 +1,9 @@
 //! Samples per second of whole renders, and how they grow with threads.
 
+use crate::load;
 use renderer::integrator::IntegratorKind;
 use renderer::job::{LocalOptions, RenderOptions, RenderSettings, Stop, render_local};
 use renderer::scene::Scene;
-use renderer::scene::bundle::DiskSource;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -49,8 +49,7 @@ pub fn run(args: &Args) -> Result<Vec<Row>, String> {
     let mut rows = Vec::new();
     for path in &args.scenes {
         let started = Instant::now();
-        let (source, root) = DiskSource::for_scene(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        let (scene, _) = Scene::load(&source, &root).map_err(|e| e.to_string())?;
+        let scene = load::scene(path)?;
         let load_s = started.elapsed().as_secs_f64();
         for &(_, integrator) in IntegratorKind::ALL {
             for threads in [1, 2] {

@@ -7,6 +7,7 @@ use renderer::integrator::IntegratorKind;
 use renderer::job::{Merger, RenderOptions, RenderSettings, Stop, run_unit};
 use renderer::scene::Scene;
 use renderer::scene::bundle::DiskSource;
+use statcheck::Mean;
 use std::path::Path;
 
 const RENDERS: u64 = 48;
@@ -42,21 +43,14 @@ fn render(scene: &Scene, kind: IntegratorKind, learns: bool, seed: u64) -> Merge
     }
 }
 
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let var = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
-    (mean, (var / n).sqrt())
-}
-
-/// Means of the renders, and their standard error.
-fn image_means(renders: &[MergedImage]) -> (f64, f64) {
+/// Means of the renders.
+fn image_means(renders: &[MergedImage]) -> Mean {
     let of = |r: &MergedImage| r.mean.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / (3 * r.mean.len()) as f64;
-    mean_and_error(&renders.iter().map(of).collect::<Vec<_>>())
+    renders.iter().map(of).collect()
 }
 
-/// Squared relative deviations of pixels from the mean of all renders (as of one that took no part in it), and the squares of the errors that
-/// they tell: sums over the picture, by render.
+/// Squared relative deviations of pixels from the mean of all renders (as of one that took no part in it), and the squares of the
+/// errors that they tell: sums over the picture, by render.
 fn deviations(renders: &[MergedImage]) -> (Vec<f64>, Vec<f64>) {
     let n = renders.len() as f64;
     let pixels = renders[0].mean.len();
@@ -76,18 +70,18 @@ fn check(kind: IntegratorKind) {
         (first..first + RENDERS).map(|seed| render(&scene, kind, learns, seed)).collect()
     };
     let (learned, power) = (renders(true, 0), renders(false, 1000));
-    let ((a, error_a), (b, error_b)) = (image_means(&learned), image_means(&power));
-    let error = (error_a * error_a + error_b * error_b).sqrt();
-    assert!((a - b).abs() < T * error, "{kind:?}: {a} against {b} by power, +- {error}");
+    let (a, b) = (image_means(&learned), image_means(&power));
+    let (difference, error) = (a.mean() - b.mean(), a.error().hypot(b.error()));
+    assert!(difference.abs() < T * error, "{kind:?}: {a:?} against {b:?} by power, +- {error}");
 
     let ((found, told), (by_power, _)) = (deviations(&learned), deviations(&power));
     let total = |v: &[f64]| v.iter().sum::<f64>();
     let ratio = total(&by_power) / total(&found);
     assert!(ratio > LEAST_GAIN, "{kind:?}: variance is only {ratio} times less");
     if kind == IntegratorKind::Path {
-        let differences: Vec<f64> = told.iter().zip(&found).map(|(t, f)| t - f).collect();
-        let (difference, error) = mean_and_error(&differences);
-        assert!(difference.abs() < T * error, "told variance less true variance: {difference} +- {error}");
+        let difference: Mean = told.iter().zip(&found).map(|(t, f)| t - f).collect();
+        let (mean, error) = (difference.mean(), difference.error());
+        assert!(mean.abs() < T * error, "told variance less true variance: {mean} +- {error}");
     }
 }
 

@@ -14,18 +14,19 @@ pub fn available() -> Result<(), String> {
     if found { Ok(()) } else { Err("instructions were not counted: valgrind is not installed".into()) }
 }
 
-/// Instructions without a skip over those with it; set-up and reading of the scene are taken off.
+/// Instructions without a skip over those with it.
 pub fn ratio(skip: &Skip, count: u32) -> Result<f64, String> {
     let count = count.min(COUNT);
-    let cost = |arm: &str| run(&format!("{}:{arm}:{count}", skip.name));
-    let (with, without) = (cost("with")?, cost("without")?);
-    let (empty_with, empty_without) =
-        (run(&format!("{}:with:0", skip.name))?, run(&format!("{}:without:0", skip.name))?);
-    Ok((without - empty_without) / (with - empty_with))
+    Ok(cost(&format!("{}:without", skip.name), count)? / cost(&format!("{}:with", skip.name), count)?)
+}
+
+/// Instructions of a render beyond those of the same process without it.
+pub fn cost(what: &str, count: u32) -> Result<f64, String> {
+    Ok(run(&format!("{what}:{count}"))? - run(&format!("{what}:0"))?)
 }
 
 /// Instructions of a process that makes one render and no more.
-pub fn run(what: &str) -> Result<f64, String> {
+fn run(what: &str) -> Result<f64, String> {
     let program = std::env::current_exe().map_err(|e| e.to_string())?;
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])

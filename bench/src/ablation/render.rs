@@ -1,19 +1,18 @@
 //! Renders with and without a skip, in this thread.
 
 use super::skips::{Skip, Without};
+use crate::error::measure::FLOOR;
 use crate::error::stats::mean_without;
+use crate::load;
 use renderer::integrator::IntegratorKind;
 use renderer::job::{Merger, PassPlan, RenderOptions, RenderSettings, Stop, run_unit};
 use renderer::scene::Scene;
-use renderer::scene::bundle::DiskSource;
 use std::path::{Path, PathBuf};
 
 /// Size of the pictures.
 const SIZE: (u32, u32) = (96, 96);
 /// Edges of the longest path, where neither the scene nor the skip bounds it.
 const MAX_DEPTH: i32 = 12;
-/// Keeps relative errors from dividing by the darkness of black pixels.
-const FLOOR: f64 = 0.01;
 
 /// One of the two renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,15 +36,9 @@ pub fn path(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file)
 }
 
-/// Reads a scene.
-fn load(file: &str) -> Result<Scene, String> {
-    let (source, root) = DiskSource::for_scene(&path(file)).map_err(|e| format!("{file}: {e}"))?;
-    Scene::load(&source, &root).map(|(scene, _)| scene).map_err(|e| e.to_string())
-}
-
 /// The scene of a render.
 pub fn scene(skip: &Skip, file: &str, arm: Arm) -> Result<Scene, String> {
-    let mut scene = load(file)?;
+    let mut scene = load::scene(&path(file))?;
     if let (Without::Scene(change), Arm::Without) = (&skip.without, arm) {
         change(&mut scene);
     }

@@ -74,8 +74,7 @@ pub fn rows() -> Result<Vec<Unused>, String> {
     for integrator in INTEGRATORS.map(IntegratorKind::name) {
         let mut base = None;
         for (feature, _) in FEATURES {
-            let run = |n: u32| count::run(&format!("{NAME}:{feature}/{integrator}:{n}"));
-            let cost = run(COUNT)? - run(0)?;
+            let cost = count::cost(&format!("{NAME}:{feature}/{integrator}"), COUNT)?;
             let instructions = cost / *base.get_or_insert(cost);
             rows.push(Unused { name: feature, scene: SCENE, integrator, instructions });
         }

@@ -10,6 +10,7 @@ mod tests;
 
 pub use report::{Report, table};
 
+use crate::load;
 use compare::{Comparison, compare};
 use picture::Picture;
 use render::{Effort, Limits, Rendering, Task};
@@ -79,7 +80,7 @@ pub fn run(args: &Args) -> Result<Report, String> {
     let cases = if args.scenes.is_empty() { defaults(args.budget) } else { scenes::chosen(&args.scenes)? };
     let mut rows = Vec::new();
     for case in &cases {
-        let session = Session { case, scene: case.load()?, args, effort: args.budget.effort() };
+        let session = Session { case, scene: load::scene(&case.file)?, args, effort: args.budget.effort() };
         session.run(&kinds, &mut rows)?;
     }
     Ok(Report::new(rows))

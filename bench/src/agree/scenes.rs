@@ -1,7 +1,5 @@
 //! The scenes on which integrators must agree.
 
-use renderer::scene::Scene;
-use renderer::scene::bundle::DiskSource;
 use std::path::{Path, PathBuf};
 
 /// A scene and how it is rendered here.
@@ -88,14 +86,6 @@ pub fn chosen(names: &[String]) -> Result<Vec<Case>, String> {
         Ok(Case { name: name.clone(), file, size: SIZE, light: true, full_only: false, exact: None })
     };
     names.iter().map(find).collect()
-}
-
-impl Case {
-    /// Reads the scene.
-    pub fn load(&self) -> Result<Scene, String> {
-        let (source, root) = DiskSource::for_scene(&self.file).map_err(|e| format!("{}: {e}", self.file.display()))?;
-        Scene::load(&source, &root).map(|(scene, _)| scene).map_err(|e| e.to_string())
-    }
 }
 
 /// A light of intensity pi in a sphere of radius 1 and albedo 1/2: 1/2 + 1/4 + ..., one term for each edge beyond the first.

@@ -3,6 +3,7 @@ use super::render::{Effort, Limits, Rendering, Task};
 use super::*;
 use renderer::film::{Filter, MergedImage};
 use renderer::integrator::IntegratorKind::{Light, Path};
+use renderer::scene::bundle::DiskSource;
 use renderer::scene::desc::FilterDesc;
 use std::path::Path as FilePath;
 
@@ -42,7 +43,7 @@ fn scaled(image: &MergedImage, area: Area, factor: f32) -> MergedImage {
 
 #[test]
 fn a_wrong_picture_is_told_from_a_right_one() {
-    let scene = case("directional").load().unwrap();
+    let scene = load::scene(&case("directional").file).unwrap();
     let path = rendered(&scene, Path, 1, 256).image;
     let filter = filter(&path);
     let reference = Picture::Rendered(&path, Path, &filter);
@@ -63,7 +64,7 @@ fn a_wrong_picture_is_told_from_a_right_one() {
 
 #[test]
 fn single_pixels_are_tested_too() {
-    let scene = case("directional").load().unwrap();
+    let scene = load::scene(&case("directional").file).unwrap();
     let path = rendered(&scene, Path, 1, 256).image;
     let mut wrong = rendered(&scene, Path, 2, 256).image;
     let filter = filter(&path);
@@ -80,7 +81,7 @@ fn single_pixels_are_tested_too() {
 #[test]
 fn known_radiances_are_told_from_wrong_ones() {
     let case = case("closed-sphere");
-    let (scene, exact) = (case.load().unwrap(), case.exact.unwrap());
+    let (scene, exact) = (load::scene(&case.file).unwrap(), case.exact.unwrap());
     assert_eq!([None, Some(1), Some(2), Some(4)].map(exact), [1.0, 0.0, 0.5, 0.875]);
     for kind in [Path, Light] {
         let image = rendered(&scene, kind, 3, 512).image;
@@ -104,8 +105,7 @@ fn every_stress_scene_is_in_the_list_loads_without_a_word_and_has_its_line() {
     listed.sort();
     assert_eq!(files, listed);
     for file in files {
-        let (source, root) =
-            renderer::scene::bundle::DiskSource::for_scene(&folder.join("stress").join(&file)).unwrap();
+        let (source, root) = DiskSource::for_scene(&folder.join("stress").join(&file)).unwrap();
         let (scene, diagnostics) = Scene::load(&source, &root).unwrap();
         assert!(diagnostics.list.is_empty(), "{file}: {:#?}", diagnostics.list);
         assert!(scene.light_count() > 0, "{file} is dark");

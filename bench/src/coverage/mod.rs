@@ -11,6 +11,7 @@ mod tests;
 pub use report::Report;
 
 use crate::agree::scenes;
+use crate::load;
 use count::{Area, Areas, Count, truth};
 use render::{Telling, many, render};
 use renderer::integrator::IntegratorKind;
@@ -67,7 +68,7 @@ pub fn run(args: &Args) -> Result<Report, String> {
     let kinds: Vec<_> = if args.integrators.is_empty() { all() } else { args.integrators.clone() };
     let mut report = Report::default();
     for case in scenes::chosen(&args.scene)? {
-        let scene = case.load()?;
+        let scene = load::scene(&case.file)?;
         let session = Session { name: &case.name, scene: &scene, args };
         let reference = session.reference()?;
         for &kind in kinds.iter().filter(|k| **k != IntegratorKind::Light || case.light) {

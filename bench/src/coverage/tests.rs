@@ -16,7 +16,7 @@ const BLOCK: u32 = 4;
 fn scene(file: &str) -> Scene {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join("scenes").join(file);
     let file = file.to_str().unwrap().to_string();
-    scenes::chosen(&[file]).unwrap()[0].load().unwrap()
+    load::scene(&scenes::chosen(&[file]).unwrap()[0].file).unwrap()
 }
 
 fn settings(scene: &Scene, options: &RenderOptions, seed: u64) -> RenderSettings {

@@ -1,7 +1,7 @@
 //! Squared errors of one picture against an estimate of the truth whose own variance is known.
 
 /// Keeps relative measures from dividing by the darkness of black pixels.
-const FLOOR: f64 = 0.01;
+pub const FLOOR: f64 = 0.01;
 /// The share of pixels that the trimmed measure leaves out: fireflies.
 const TRIM: f64 = 0.001;
 /// The share of pixels that count as dark.

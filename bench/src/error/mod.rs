@@ -12,11 +12,11 @@ pub mod variant;
 
 pub use report::Report;
 
+use crate::load;
 use preset::Preset;
 use reference::{Pool, Reference, ReferencePicture};
 use renderer::job::RenderSettings;
 use renderer::scene::Scene;
-use renderer::scene::bundle::DiskSource;
 use runs::Run;
 use std::path::PathBuf;
 use variant::{Budget, Variant};
@@ -82,8 +82,7 @@ struct Plan {
 /// Runs the benchmark.
 pub fn run(args: &Args) -> Result<Report, String> {
     let plan = plan(args)?;
-    let (source, root) = DiskSource::for_scene(&plan.scene).map_err(|e| format!("{}: {e}", plan.scene.display()))?;
-    let (scene, _) = Scene::load(&source, &root).map_err(|e| e.to_string())?;
+    let scene = load::scene(&plan.scene)?;
     let mut jobs = Vec::with_capacity(plan.variants.len());
     for v in &plan.variants {
         jobs.push((v.name.as_str(), settings(args, &plan, v, &scene)?));

@@ -5,14 +5,13 @@ mod embree;
 mod growth;
 mod sets;
 
+use crate::load;
 use crate::meshes::room;
 use embree::Embree;
 use renderer::accel::Accel;
 use renderer::camera::Camera;
 use renderer::geometry::{Geometry, MeshId, Object, Shape};
 use renderer::math::{Ray, Transform, Vec2, Vec3};
-use renderer::scene::Scene;
-use renderer::scene::bundle::DiskSource;
 use sets::Set;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -131,8 +130,7 @@ fn room_subject(triangles: usize) -> Subject {
 
 /// A scene file, seen by its camera.
 fn scene_subject(path: &std::path::Path) -> Result<Subject, String> {
-    let (source, root) = DiskSource::for_scene(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let (scene, _) = Scene::load(&source, &root).map_err(|e| e.to_string())?;
+    let scene = load::scene(path)?;
     let camera = Camera::new(&scene.camera, SIDE as u32, SIDE as u32).map_err(|e| e.to_string())?;
     let raster = |i: usize| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5);
     let camera = (0..SIDE * SIDE).map(|i| camera.generate_ray(raster(i), Vec2::splat(0.5))).collect();

@@ -13,11 +13,10 @@ mod scene;
 mod truth;
 
 use crate::error::process;
+use crate::load;
 use document::{About, Document, SceneReport};
 use external::External;
 use measure::{Clock, Contender, Maker, Stage};
-use renderer::scene::Scene;
-use renderer::scene::bundle::DiskSource;
 use scene::{BenchScene, Budget};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -101,8 +100,7 @@ pub fn run(args: &Args) -> Result<String, String> {
 fn measure_scene(args: &Args, bench: &BenchScene, others: &[External]) -> Result<SceneReport, String> {
     let resident = process::resident_mib();
     let started = Instant::now();
-    let (source, root) = DiskSource::for_scene(&bench.file).map_err(|e| format!("{}: {e}", bench.file.display()))?;
-    let (scene, _) = Scene::load(&source, &root).map_err(|e| e.to_string())?;
+    let (scene, source, root) = load::with_source(&bench.file)?;
     let load_s = started.elapsed().as_secs_f64();
     let digest = source.into_bundle(root).0.digest();
     let stage = Stage {

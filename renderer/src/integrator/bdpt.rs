@@ -169,26 +169,22 @@ struct Film<'a> {
 
 impl Sink for Film<'_> {
     fn add(&mut self, _s: usize, _t: usize, path: &Connection) {
-        // As many walks start at lights as pixels have samples together.
         let view = self.c.view;
-        let share = match path.raster {
-            None => {
-                self.pixel += path.weighted();
-                1.0
-            }
-            Some(raster) => {
-                self.splats.splat(&view.filter, raster, path.weighted());
-                1.0 / (view.width as f32 * view.height as f32)
-            }
-        };
-        if let Some(light) = path.light {
+        match path.raster {
+            None => self.pixel += path.weighted(),
+            Some(raster) => self.splats.splat(&view.filter, raster, path.weighted()),
+        }
+        if let Some(light) = path.light.filter(|_| self.lessons.learns()) {
+            // As many walks start at lights as pixels have samples together.
+            let share = path.raster.map_or(1.0, |_| 1.0 / (view.width as f32 * view.height as f32));
             self.lessons.gave(light, self.c.selector.pmf(light), path.weighted() * share);
         }
     }
 }
 
 /// Renders samples `samples` of each pixel of a tile, and the splats of their walks from the lights over the whole film; `None` when
-/// stopped. What is found teaches of the lights. As many walks start at lights as at the camera: the sum of the splats over their number is their part of the image.
+/// stopped. What is found teaches of the lights. As many walks start at lights as at the camera: the sum of the splats over their
+/// number is their part of the image.
 pub fn render_tile(
     c: &UnitContext<'_>,
     rect: Rect,

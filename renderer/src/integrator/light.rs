@@ -17,36 +17,37 @@ const LIGHT_STREAM: u64 = 1 << 40;
 /// The block of numbers of the light seen directly lies beyond those of all walks.
 const EMISSION: u32 = 1 << 20;
 
-/// Traces light paths `paths` of the replicate; `None` when stopped. Returns what they taught of the lights.
+/// Traces light paths `paths` of the replicate, and says whether it came to their end. What they find teaches of the lights.
 ///
 /// The sum of the splats over N paths, divided by N, is the image.
 pub fn trace_paths(
     c: &UnitContext<'_>,
     paths: Range<u64>,
     splats: &mut SplatSums,
+    lessons: &mut LightLessons,
     counters: &mut Counters,
-) -> Option<Vec<f64>> {
+) -> bool {
     counters.samples += paths.end - paths.start;
     let tracer = c.tracer(Some(c.rr_depth));
-    let mut film = Film { c, tracer, splats, lessons: LightLessons::new(c.scene.lights.len()) };
+    let mut film = Film { c, tracer, splats, lessons };
     let mut walk = Subpath::default();
     for path in paths {
         if path % 256 == 0 && (c.stopped)() {
-            return None;
+            return false;
         }
         let mut sampler = SobolSampler::new(c.seed, c.replicate, LIGHT_STREAM + (path >> 32), path as u32);
         film.emission(&mut sampler);
         film.scattered(&mut walk, &mut sampler);
     }
     counters.add(&film.tracer.counters);
-    Some(film.lessons.into_sums())
+    true
 }
 
 struct Film<'a> {
     c: &'a UnitContext<'a>,
     tracer: Tracer<'a>,
     splats: &'a mut SplatSums,
-    lessons: LightLessons,
+    lessons: &'a mut LightLessons,
 }
 
 impl Film<'_> {

@@ -12,7 +12,7 @@ use crate::light::LightLessons;
 use crate::math::{Anchor, Ray, Vec2, Vec3};
 use crate::medium::{Channels, Equiangular, passing_probability};
 use crate::path::{MediumPoint, Scattering, power_heuristic, roulette};
-use crate::sampling::Sampler;
+use crate::sampling::{Choice, Sampler};
 use crate::scene::{Enclosures, Event, Target};
 use crate::spectrum::Rgb;
 use std::ops::Range;
@@ -150,10 +150,10 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             // Connect to a light.
             if !here.scattering.is_delta_only()
                 && self.c.carried.has(edges + 1)
-                && let Some((light, direct)) = self.next_event(here, &leg)
+                && let Some((choice, direct)) = self.next_event(here, &leg)
             {
                 self.add(&mut total, beta, direct);
-                self.lessons.gave(light, self.c.selector.pmf(light), beta * direct);
+                self.lessons.gave(choice.index, choice.pmf, beta * direct);
             }
 
             // Go on in a direction drawn from the BSDF or the phase function.
@@ -257,8 +257,8 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         radiance * power_heuristic(arrival.pdf, pdf_light)
     }
 
-    /// Light that comes straight from a chosen light, and which.
-    fn next_event(&mut self, here: Here, leg: &Leg) -> Option<(usize, Rgb)> {
+    /// Light that comes straight from a chosen light, and the choice.
+    fn next_event(&mut self, here: Here, leg: &Leg) -> Option<(Choice, Rgb)> {
         let scene = self.c.scene;
         let (uc, u) = self.sampler.next_3();
         let choice = self.c.selector.sample(uc)?;
@@ -281,14 +281,14 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             let around = scene.beside(object, from, li.wi, &leg.around);
             let through = scene.transmission(from, &li.into(), around, &mut self.counters.rays)?;
             let direct = weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
-            return Some((choice.index, direct * light.position().map_or(1.0, |lamp| not_near_lamp(here, leg, lamp))));
+            return Some((choice, direct * light.position().map_or(1.0, |lamp| not_near_lamp(here, leg, lamp))));
         }
         let contribution = weighted(pdf_scattering);
         if contribution.is_black() {
             return None;
         }
         self.counters.rays += 1;
-        (!scene.accel.occluded(&li.shadow_ray(from))).then_some((choice.index, contribution))
+        (!scene.accel.occluded(&li.shadow_ray(from))).then_some((choice, contribution))
     }
 
     /// Light of a lamp without extent that is scattered once into the flight ahead, at a point chosen near the lamp.

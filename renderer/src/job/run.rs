@@ -105,15 +105,21 @@ fn run(
         stopped: &|| stop.stopped(),
     };
     let mut result = UnitResult::default();
+    // The last pass has nobody to teach, and all passes of chains keep what the pilot's pool taught.
+    let learns = match unit.kind {
+        UnitKind::Tile { .. } | UnitKind::Paths { .. } => !plan.last && plan.chains.is_none(),
+        UnitKind::Bootstrap { .. } => pass == 0,
+        UnitKind::Chains { .. } => false,
+    };
+    let mut lessons = if learns { LightLessons::new(scene.lights.len()) } else { LightLessons::default() };
     let done = match unit.kind {
         UnitKind::Tile { rect, start, end, .. } => {
-            run_tile(&context, (plan, settings.integrator), rect, start..end, &mut result)
+            run_tile(&context, (plan, settings.integrator), (rect, start..end), &mut lessons, &mut result)
         }
         UnitKind::Paths { start, end } => {
             let mut splats = SplatSums::new(settings.width, settings.height);
-            let sums = integrator::light::trace_paths(&context, start..end, &mut splats, &mut result.counters);
-            let done = sums.is_some();
-            result.light_sums = sums.unwrap_or_default();
+            let counters = &mut result.counters;
+            let done = integrator::light::trace_paths(&context, start..end, &mut splats, &mut lessons, counters);
             result.paths = end - start;
             result.splats = Some(splats);
             done
@@ -122,11 +128,8 @@ fn run(
             let Some(constants) = &plan.chains else { return Ok(None) };
             // The pilot's samples are a preview.
             let mut splats = (pass == 0).then(|| SplatSums::new(settings.width, settings.height));
-            let lessons = if pass == 0 { LightLessons::new(scene.lights.len()) } else { LightLessons::default() };
-            let pool = mmlt::PoolTask { pass, samples: start..end, splats: splats.as_mut(), lessons };
-            let made = mmlt::run_bootstrap(&context, constants, &settings.mmlt, pool, &mut result.counters);
-            (result.bootstrap, result.light_sums) =
-                made.map(|(sums, l)| (Some(sums), l.into_sums())).unwrap_or_default();
+            let pool = mmlt::PoolTask { pass, samples: start..end, splats: splats.as_mut(), lessons: &mut lessons };
+            result.bootstrap = mmlt::run_bootstrap(&context, constants, &settings.mmlt, pool, &mut result.counters);
             result.splats = splats;
             result.bootstrap.is_some()
         }
@@ -150,6 +153,7 @@ fn run(
     if let Some(splats) = &mut result.splats {
         splats.round();
     }
+    result.light_sums = lessons.into_sums();
     Ok(done.then_some(result))
 }
 
@@ -202,13 +206,10 @@ pub fn render_strategies(
 fn run_tile(
     c: &UnitContext<'_>,
     (plan, integrator): (&PassPlan, IntegratorKind),
-    rect: Rect,
-    samples: Range<u32>,
+    (rect, samples): (Rect, Range<u32>),
+    lessons: &mut LightLessons,
     result: &mut UnitResult,
 ) -> bool {
-    // The last pass has nobody to teach, and plans of chains learn from pools.
-    let learns = !plan.last && plan.chains.is_none();
-    let mut lessons = if learns { LightLessons::new(c.scene.lights.len()) } else { LightLessons::default() };
     let counters = &mut result.counters;
     if plan.sampling == Sampling::SplattingTiles {
         let mut splats = SplatSums::new(c.view.width, c.view.height);
@@ -216,13 +217,12 @@ fn run_tile(
         result.tile = if integrator == IntegratorKind::Moments {
             integrator::moments::render_tile(c, rect, samples, &mut splats, counters)
         } else {
-            integrator::bdpt::render_tile(c, rect, samples, &mut splats, &mut lessons, counters)
+            integrator::bdpt::render_tile(c, rect, samples, &mut splats, lessons, counters)
         };
         result.splats = Some(splats);
     } else {
-        result.tile = integrator::path::render_tile(c, rect, samples, &mut lessons, counters);
+        result.tile = integrator::path::render_tile(c, rect, samples, lessons, counters);
     }
-    result.light_sums = lessons.into_sums();
     result.tile.is_some()
 }
 

@@ -12,7 +12,8 @@ const MOST: usize = 1024;
 /// probabilities are with which lights are selected meanwhile.
 #[derive(Clone, Debug, Default)]
 pub struct LightLessons {
-    /// For each light the squares of its samples' contributions times its probability, then for each its samples' rays over its probability.
+    /// For each light the squares of its samples' contributions times its probability, then for each its samples' rays over its
+    /// probability.
     sums: Vec<f64>,
 }
 
@@ -21,6 +22,12 @@ impl LightLessons {
     pub fn new(lights: usize) -> Self {
         let learns = (2..=MOST).contains(&lights);
         Self { sums: vec![0.0; if learns { 2 * lights } else { 0 }] }
+    }
+
+    /// Whether anything is learned.
+    #[inline]
+    pub fn learns(&self) -> bool {
+        !self.sums.is_empty()
     }
 
     /// A sample of a light was made, which was selected with probability `pmf`, and took so many rays.
@@ -41,7 +48,7 @@ impl LightLessons {
     /// A sample of a light, over its probability `pmf`, was added to the picture (unless it is no number).
     #[inline]
     pub fn gave(&mut self, light: usize, pmf: f32, contribution: Rgb) {
-        if !self.sums.is_empty() && contribution.is_valid() {
+        if self.learns() && contribution.is_valid() {
             let luminance = f64::from(contribution.luminance());
             self.sums[light] += luminance * luminance * f64::from(pmf);
         }

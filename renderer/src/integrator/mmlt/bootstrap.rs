@@ -52,7 +52,7 @@ pub struct PoolTask<'a> {
     /// Where they are splatted, if at all.
     pub splats: Option<&'a mut SplatSums>,
     /// What they teach of the lights.
-    pub lessons: LightLessons,
+    pub lessons: &'a mut LightLessons,
 }
 
 /// Makes samples of the pool of a pass and the replicate; `None` when stopped.
@@ -62,11 +62,10 @@ pub fn run_bootstrap(
     options: &MmltOptions,
     task: PoolTask<'_>,
     counters: &mut Counters,
-) -> Option<(BootstrapSums, LightLessons)> {
+) -> Option<BootstrapSums> {
     let PoolTask { pass, samples, splats, lessons } = task;
     counters.samples += u64::from(samples.end - samples.start);
-    let mut pool = Pool::new(c, constants, options, splats);
-    pool.lessons = lessons;
+    let mut pool = Pool::new(c, constants, options, splats, lessons);
     for index in samples {
         if index % 64 == 0 && (c.stopped)() {
             return None;
@@ -74,7 +73,7 @@ pub fn run_bootstrap(
         pool.sample(index, sample_key(c.seed, pass, c.replicate, index));
     }
     counters.add(&pool.tracer.counters);
-    Some((pool.sums, pool.lessons))
+    Some(pool.sums)
 }
 
 /// What the paths of one length of one sample came to so far.
@@ -100,7 +99,7 @@ struct Pool<'a, 'b> {
     lengths: Vec<Length>,
     sums: BootstrapSums,
     splats: Option<&'b mut SplatSums>,
-    lessons: LightLessons,
+    lessons: &'b mut LightLessons,
     /// Chooses among the paths of a sample.
     choices: IndependentSampler,
 }
@@ -111,6 +110,7 @@ impl<'a, 'b> Pool<'a, 'b> {
         constants: &'a ChainConstants,
         options: &MmltOptions,
         splats: Option<&'b mut SplatSums>,
+        lessons: &'b mut LightLessons,
     ) -> Self {
         let longest = constants.depths.iter().map(|d| d.edges).max().unwrap_or(0) as usize;
         let techniques = constants.depths.iter().map(|d| vec![0.0; d.edges as usize + 1]).collect();
@@ -127,7 +127,7 @@ impl<'a, 'b> Pool<'a, 'b> {
             lengths: vec![Length::default(); constants.depths.len()],
             sums: BootstrapSums { found: Vec::new(), techniques },
             splats,
-            lessons: LightLessons::default(),
+            lessons,
             choices: IndependentSampler::new([0]),
         }
     }

@@ -1,7 +1,7 @@
 //! The plans of a Metropolis job, and what it has learned so far.
 //!
-//! * Pass 0 is the *pilot*: independent samples of every path length. It teaches which lights to select, the probabilities of the techniques and the target map,
-//!   and is a preview; its samples count for nothing else, so nothing that it steers is biased by it.
+//! * Pass 0 is the *pilot*: independent samples of every path length. It teaches which lights to select, the probabilities of the
+//!   techniques and the target map, and is a preview; its samples count for nothing else, so nothing that it steers is biased by it.
 //! * Pass 1 makes *pools*: independent samples again, now of the target that the chains will have. A pool's mean is `b`.
 //! * Later passes run *chains* from starts drawn from the pools, and the ordinary samples of emission and direct light; where time or
 //!   error is the budget, they also make the pools of the pass after. What a pass does for a group is a complete estimate of its own,
