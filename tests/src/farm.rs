@@ -105,6 +105,23 @@ impl Farm {
         child.kill().and_then(|()| child.wait()).expect("it dies");
     }
 
+    /// Lets a worker run for a moment only; then it is stopped (SIGSTOP) and holds what it holds, until [`Farm::resume_worker`].
+    pub fn step_worker(&self, name: &str, moment: Duration) {
+        self.resume_worker(name);
+        std::thread::sleep(moment);
+        self.signal_worker(name, "STOP");
+    }
+
+    /// Lets a stopped worker go on (SIGCONT).
+    pub fn resume_worker(&self, name: &str) {
+        self.signal_worker(name, "CONT");
+    }
+
+    fn signal_worker(&self, name: &str, which: &str) {
+        let (_, child) = self.workers.iter().find(|(n, _)| n == name).expect("such a worker");
+        signal(child, which);
+    }
+
     /// Asks a worker to end (SIGTERM) and waits for it.
     pub fn drain_worker(&mut self, name: &str, patience: Duration) -> ExitStatus {
         let mut child = self.take_worker(name);
