@@ -151,6 +151,13 @@ impl Camera {
         self.raster(self.camera_space(lens), self.axes.transpose() * w.as_dvec3())
     }
 
+    /// Whether a raster position lies on the picture. Around it nothing is splatted.
+    #[inline]
+    pub fn shows(&self, raster: Vec2) -> bool {
+        let size = (2.0 * self.half).as_vec2();
+        raster.x >= 0.0 && raster.y >= 0.0 && raster.x < size.x && raster.y < size.y
+    }
+
     /// Connects `p` to a point of the lens, uniform in its area; `None` behind the lens. The picture's border does not matter.
     pub fn sample_we(&self, p: Vec3, lens_u: Vec2) -> Option<WeSample> {
         let lens = if self.is_pinhole() { DVec3::ZERO } else { self.lens_point(lens_u) };

@@ -30,6 +30,8 @@ fn projecting_a_ray_gives_its_raster_position() {
             assert!((ray.d.length() - 1.0).abs() < 1e-6);
             let by_direction = camera.project_direction(ray.d, ray.o).unwrap();
             assert!((by_direction - at).abs().max_element() < 1e-4, "{at} {by_direction}");
+            let inside = at.min_element() >= 0.0 && at.x < SIZE.0 as f32 && at.y < SIZE.1 as f32;
+            assert_eq!(camera.shows(at), inside, "{at}");
             // Points far along the ray, so that their own rounding does not count.
             let by_point = camera.project(ray.at(100.0), ray.o).unwrap();
             assert!((by_point - at).abs().max_element() < 1e-3, "{at} {by_point}");

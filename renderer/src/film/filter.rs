@@ -208,9 +208,10 @@ impl Filter {
         if !(x >= 0.0 && x < size as f32) {
             return (0, 0);
         }
-        // Pixels with -radius <= x - centre < radius.
-        let first = (floor(x - self.radius - 0.5) + 1).max(0);
-        let last = floor(x + self.radius - 0.5).min(i64::from(size) - 1);
+        // Pixels with -radius <= x - centre < radius. Exact in f64; in f32 a splat just beside a border counts on both its sides.
+        let (at, radius) = (f64::from(x) - 0.5, f64::from(self.radius));
+        let first = (floor(at - radius) + 1).max(0);
+        let last = floor(at + radius).min(i64::from(size) - 1);
         let count = (last + 1 - first).clamp(0, MAX_FOOTPRINT as i64) as usize;
         let first = first as u32;
         for (i, w) in (first..).zip(&mut weights[..count]) {
@@ -230,9 +231,9 @@ impl Filter {
 /// The largest integer that is not above `x`, which lies within some thousands of a picture. std's asks a library where the target has
 /// no instruction for it.
 #[inline]
-fn floor(x: f32) -> i64 {
+fn floor(x: f64) -> i64 {
     let i = x as i64;
-    i - i64::from(i as f32 > x)
+    i - i64::from(i as f64 > x)
 }
 
 /// The unnormalised profile at distance `t` in [0, 1] radii.
@@ -358,6 +359,19 @@ mod tests {
             Filter::new(&FilterDesc::Box { radius: 0.5 }, 3, 3).weights(Vec2::new(2.0, 0.0)).iter().collect::<Vec<_>>(),
             [(2, 0, 1.0)]
         );
+    }
+
+    /// Just beside a pixel's border a splat counts on its side only, however the sums round.
+    #[test]
+    fn splats_beside_a_border_count_once() {
+        let filter = Filter::new(&FilterDesc::Box { radius: 0.5 }, 64, 64);
+        for border in 1..64u16 {
+            let at = f32::from(border);
+            for (x, column) in [(at.next_down(), border - 1), (at, border), (at.next_up(), border)] {
+                let counted: Vec<_> = filter.weights(Vec2::new(x, 10.5)).iter().collect();
+                assert_eq!(counted, [(u32::from(column), 10, 1.0)], "{x}");
+            }
+        }
     }
 
     /// The profiles are what they are called, to the accuracy of the table.

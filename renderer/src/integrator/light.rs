@@ -68,7 +68,8 @@ impl Film<'_> {
         if li.delta {
             return;
         }
-        let Some(raster) = view.camera.project_direction(li.wi, lens) else { return };
+        let raster = view.camera.project_direction(li.wi, lens);
+        let Some(raster) = raster.filter(|raster| view.camera.shows(*raster)) else { return };
         // Directions per raster area, from the density of uniform raster positions over the whole picture.
         let pixels = view.width as f32 * view.height as f32;
         let per_raster_area = view.camera.pdf_we(li.wi).1 * pixels;

@@ -276,11 +276,14 @@ impl Tracer<'_> {
     }
 
     /// Strategy (s, 1), s > 1: vertex s - 1 of the light walk seen from the lens. The contribution is that of the whole picture, to be
-    /// weighted by the filter at `raster`.
+    /// weighted by the filter at `raster`; `None` beside the picture.
     pub fn to_lens(&mut self, light: &Subpath, s: usize, lens_u: Vec2) -> Option<Connection> {
         let at = &light.vertices[s - 1];
         let scattering = at.connectible()?;
         let we = self.camera.sample_we(at.anchor.p, lens_u)?;
+        if !self.camera.shows(we.raster) {
+            return None;
+        }
         let (f, _) = scattering.eval_pdf(we.wi, Transport::Importance);
         let cos = scattering.abs_cos(we.wi) * scattering.adjoint_correction(we.wi);
         let value = at.beta * f * (cos * we.we / we.pdf);
