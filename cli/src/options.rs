@@ -33,6 +33,9 @@ pub struct RenderArgs {
     /// Give noisy tiles more samples and quiet ones fewer (path) [default: true with --target-error]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub adaptive: Option<bool>,
+    /// Share paths between the pixels of small blocks where that pays (path): less noise, alike in neighbours [default: true]
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
+    pub share: Option<bool>,
     /// Width and height in pixels, such as 640x480
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -55,6 +58,7 @@ impl RenderArgs {
             time_s: self.time,
             target_error: self.target_error,
             adaptive: self.adaptive,
+            share: self.share,
             size: self.size,
             max_depth: self.max_depth,
             seed: self.seed,

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
+mod common;
+
+use common::deviations;
 use renderer::film::MergedImage;
 use renderer::integrator::IntegratorKind;
 use renderer::job::{Merger, RenderOptions, RenderSettings, Stop, run_unit};
@@ -47,21 +50,6 @@ fn render(scene: &Scene, kind: IntegratorKind, learns: bool, seed: u64) -> Merge
 fn image_means(renders: &[MergedImage]) -> Mean {
     let of = |r: &MergedImage| r.mean.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / (3 * r.mean.len()) as f64;
     renders.iter().map(of).collect()
-}
-
-/// Squared relative deviations of pixels from the mean of all renders (as of one that took no part in it), and the squares of the
-/// errors that they tell: sums over the picture, by render.
-fn deviations(renders: &[MergedImage]) -> (Vec<f64>, Vec<f64>) {
-    let n = renders.len() as f64;
-    let pixels = renders[0].mean.len();
-    let mean: Vec<f64> =
-        (0..pixels).map(|i| renders.iter().map(|r| f64::from(r.mean[i][1])).sum::<f64>() / n).collect();
-    let relative = |i: usize, v: f64| v * v / (mean[i] * mean[i] + 0.01);
-    let true_of = |r: &MergedImage| {
-        (0..pixels).map(|i| relative(i, f64::from(r.mean[i][1]) - mean[i])).sum::<f64>() * n / (n - 1.0)
-    };
-    let told = |r: &MergedImage| (0..pixels).map(|i| relative(i, f64::from(r.std_error[i][1]))).sum();
-    (renders.iter().map(true_of).collect(), renders.iter().map(told).collect())
 }
 
 fn check(kind: IntegratorKind) {

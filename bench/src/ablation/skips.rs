@@ -81,6 +81,14 @@ pub const SKIPS: &[Skip] = &[
         without: Without::Settings(|s| s.adaptive = false),
     },
     Skip {
+        name: "shared-paths",
+        what: "paths of pixels whose neighbours' paths show as much",
+        scene: "scenes/cornell-diffuse.toml",
+        integrator: Path,
+        settings: AS_THEY_ARE,
+        without: Without::Settings(|s| s.share = false),
+    },
+    Skip {
         name: "dim-connections",
         what: "shadow rays of connections that carry little: cast by chance",
         scene: "scenes/cornell.toml",

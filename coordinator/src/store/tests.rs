@@ -17,6 +17,7 @@ fn spec() -> JobSpec {
         seed: 1,
         replicates: 2,
         adaptive: false,
+        share: true,
         mmlt: Default::default(),
     };
     JobSpec {

@@ -1,7 +1,7 @@
 use super::dielectric::{Split, radiance_scale};
 use super::microfacet::{Microfacet, reflecting_facet, refracting_facet};
 use super::resolve::At;
-use super::{BsdfSample, Distribution, Lobe, Model, Transport, fresnel};
+use super::{BsdfSample, Distribution, Lobe, Model, Spread, Transport, fresnel};
 use crate::math::{INV_PI, Vec2, Vec3, lerp, sqr};
 use crate::sampling::warp;
 use crate::spectrum::Rgb;
@@ -9,6 +9,10 @@ use crate::texture::{FloatParam, RgbParam};
 
 /// An index of refraction kept this far from one, so that refracting facets can be told from the two directions in f32.
 const MIN_CONTRAST: f32 = 1e-3;
+
+/// Coats at least as rough as this are broad: at a roughness of a third the coat of a dielectric is about as bright as a white base, at
+/// most.
+const BROAD_ALPHA: f32 = 0.1;
 
 /// glTF 2.0 metallic-roughness (appendix B of the specification) with KHR_materials_ior and KHR_materials_transmission; both
 /// sides scatter.
@@ -228,6 +232,13 @@ impl Model for Gltf {
 
     fn transmits(&self) -> bool {
         self.metallic < 1.0 && self.transmission > 0.0 && !self.base.is_black()
+    }
+
+    #[inline]
+    fn spread(&self) -> Spread {
+        let rough = self.facets.is_some_and(|f| f.least_alpha() >= BROAD_ALPHA);
+        let coated = self.metallic <= 0.5 && self.transmission == 0.0 && self.diffuse_albedo().max_component() > 0.0;
+        if rough && coated { Spread::Broad } else { Spread::Narrow }
     }
 
     fn albedo(&self) -> Rgb {

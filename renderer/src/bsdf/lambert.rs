@@ -1,5 +1,5 @@
 use super::resolve::At;
-use super::{BsdfSample, Lobe, Model, Transport};
+use super::{BsdfSample, Lobe, Model, Spread, Transport};
 use crate::math::{INV_PI, Vec2, Vec3};
 use crate::sampling::warp;
 use crate::spectrum::Rgb;
@@ -39,6 +39,11 @@ impl Model for Lambert {
     #[inline]
     fn chooses(&self) -> bool {
         false
+    }
+
+    #[inline]
+    fn spread(&self) -> Spread {
+        Spread::Even
     }
 
     fn albedo(&self) -> Rgb {

@@ -25,6 +25,12 @@ impl Microfacet {
         (alpha.max_element() >= SMOOTH_ALPHA).then(|| Self { distribution, alpha: alpha.max(Vec2::splat(MIN_ALPHA)) })
     }
 
+    /// The smaller of its two slope parameters.
+    #[inline]
+    pub fn least_alpha(&self) -> f32 {
+        self.alpha.min_element()
+    }
+
     /// Density of facet normals `wm` (upper hemisphere, unit) per solid angle and projected area.
     #[inline]
     pub fn d(&self, wm: Vec3) -> f32 {

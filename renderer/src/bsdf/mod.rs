@@ -98,6 +98,18 @@ impl Lobe {
     }
 }
 
+/// How what a surface reflects depends on the direction from which it is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spread {
+    /// Not at all, on one side of it.
+    Even,
+    /// Little: directions drawn for one are not bad for another, and all on the same side may be drawn. Nothing passes, and no lobe is
+    /// delta.
+    Broad,
+    /// Perhaps strongly.
+    Narrow,
+}
+
 /// A direction drawn from a BSDF, in the shading frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
@@ -134,6 +146,11 @@ pub trait Model: Copy {
     /// Whether anything passes to the other side.
     fn transmits(&self) -> bool {
         false
+    }
+
+    /// How what it reflects depends on the direction from which it is seen.
+    fn spread(&self) -> Spread {
+        Spread::Narrow
     }
 
     /// Rough reflectance for the albedo image, in [0, 1].
@@ -221,6 +238,12 @@ macro_rules! bsdfs {
             #[inline]
             pub fn transmits(&self) -> bool {
                 match self { $(Self::$name(m) => m.transmits(),)* }
+            }
+
+            /// How what it reflects depends on the direction from which it is seen.
+            #[inline]
+            pub fn spread(&self) -> Spread {
+                match self { $(Self::$name(m) => m.spread(),)* }
             }
 
             /// Rough reflectance for the albedo image, in [0, 1].

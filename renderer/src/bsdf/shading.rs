@@ -117,6 +117,12 @@ impl ShadingPoint {
         Self { frame, ng, wo: frame.to_local(wo), bsdf, wo_dot_ng: wo.dot(ng), sides }
     }
 
+    /// The same point seen from another direction on the same side of both normals, where two-sided materials are the same.
+    #[inline]
+    pub fn seen_from(&self, wo: Vec3) -> Self {
+        Self { wo: self.frame.to_local(wo), wo_dot_ng: wo.dot(self.ng), ..*self }
+    }
+
     /// Value without cosine and density per solid angle for the world-space direction `wi`; delta lobes are in neither.
     #[inline]
     pub fn eval_pdf(&self, wi: Vec3, mode: Transport) -> (Rgb, f32) {

@@ -120,6 +120,43 @@ impl Filter {
         (0..STEPS * STEPS).map(squares).sum::<f64>() / f64::from(STEPS * STEPS)
     }
 
+    /// Variance of a pixel over that of a sample, at one sample per pixel, where the samples of blocks of `side` times `side` pixels have
+    /// all of their noise in common, wherever the blocks begin. ([`Filter::spread`] is that of blocks of one pixel.)
+    pub fn spread_of_blocks(&self, side: u32) -> f64 {
+        const STEPS: u32 = 16;
+        if !self.shares() {
+            return 1.0;
+        }
+        let axis = |size: u32| {
+            // Mean weight of the samples of the pixels around in that in the middle, and what the weights scatter.
+            let (middle, reach) = (size / 2, self.reach());
+            let pixels = middle.saturating_sub(reach)..(middle + reach + 1).min(size);
+            let moments = |i: u32| {
+                let weight = |step: u32| {
+                    let mut weights = [0.0; MAX_FOOTPRINT];
+                    let at = i as f32 + (step as f32 + 0.5) / STEPS as f32;
+                    let (first, count) = self.weights_axis(at, size, &mut weights);
+                    let found = (first..).zip(&weights[..count]).find(|(p, _)| *p == middle);
+                    found.map_or(0.0, |(_, w)| f64::from(*w))
+                };
+                let (sum, squares) = (0..STEPS).map(weight).fold((0.0, 0.0), |(s, q), w| (s + w, q + w * w));
+                (sum / f64::from(STEPS), squares / f64::from(STEPS))
+            };
+            let moments: Vec<(f64, f64)> = pixels.map(moments).collect();
+            let scatter: f64 = moments.iter().map(|(mean, square)| square - mean * mean).sum();
+            let joint = |start: usize| {
+                let blocks = 0..(moments.len() + start).div_ceil(side as usize);
+                let of = |block: usize| {
+                    let inside = moments.iter().enumerate().filter(|(i, _)| (i + start) / side as usize == block);
+                    inside.map(|(_, (mean, _))| mean).sum::<f64>()
+                };
+                blocks.map(of).map(|mean| mean * mean).sum::<f64>()
+            };
+            scatter + (0..side as usize).map(joint).sum::<f64>() / f64::from(side)
+        };
+        axis(self.size[0]) * axis(self.size[1])
+    }
+
     /// How much larger the variance of the mean over `pixels` is than the mean of the pixels' variances over their number, along one
     /// axis (0 = x, 1 = y), where pixels share samples: the integral of the squared sum of their filters, over the sum of the integrals of
     /// their squares. 1 where they share none.
@@ -372,6 +409,26 @@ mod tests {
                 assert_eq!(counted, [(u32::from(column), 10, 1.0)], "{x}");
             }
         }
+    }
+
+    #[test]
+    fn blocks_gain_less_from_wide_filters() {
+        let filter = |desc| Filter::new(&desc, 64, 48);
+        assert_eq!(filter(FilterDesc::Box { radius: 0.5 }).spread_of_blocks(4), 1.0);
+        for desc in [FilterDesc::Tent { radius: 1.0 }, FilterDesc::Gaussian { stddev: 0.5 }] {
+            let f = filter(desc);
+            assert!((f.spread_of_blocks(1) / f.spread() - 1.0).abs() < 0.01, "{desc:?}");
+            let spreads = [1, 2, 4, 8, 1000].map(|side| f.spread_of_blocks(side));
+            assert!(spreads.windows(2).all(|w| w[0] < w[1]), "{desc:?}: {spreads:?}");
+            // Very large ones share all of their noise, and the weights' own remains: each axis a sum of 1 and what they scatter.
+            assert!(spreads[4] > 0.99, "{desc:?}: {spreads:?}");
+        }
+        // Of a tent the weights of a pixel's own samples and of those beside it are 3/4 and 1/8 in the mean, and scatter by
+        // (7/12 - 9/16) + 2 (1/24 - 1/64).
+        let scatter = 7.0 / 12.0 - 9.0 / 16.0 + 2.0 * (1.0 / 24.0 - 1.0 / 64.0);
+        let two_thirds_apart: f64 = scatter + (2.0 * (49.0 + 1.0) / 64.0 + 1.0) / 3.0;
+        let found = filter(FilterDesc::Tent { radius: 1.0 }).spread_of_blocks(3);
+        assert!((found / (two_thirds_apart * two_thirds_apart) - 1.0).abs() < 0.01, "{found}");
     }
 
     /// The profiles are what they are called, to the accuracy of the table.

@@ -93,6 +93,8 @@ pub struct UnitContext<'a> {
     pub rr_depth: u32,
     /// Contributions of connections below this are tested for visibility by chance only; 0 = never.
     pub threshold: f32,
+    /// Whether paths of pixels may share their second vertices.
+    pub share: bool,
     /// Chooses lights: by power, or as the plan says.
     pub selector: &'a LightSelector,
     /// Whether the unit should end without a result.

@@ -2,10 +2,12 @@
 
 pub mod bdpt;
 mod context;
+mod gauge;
 pub mod light;
 pub mod mmlt;
 pub mod moments;
 pub mod path;
+mod share;
 pub mod strategies;
 mod tile;
 

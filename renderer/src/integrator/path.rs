@@ -4,6 +4,7 @@
 //! In media, lamps without extent are met in two ways: from where the path scatters, and from points of its flights that are chosen
 //! near the lamp, since what a lamp gives to points chosen without regard to it has no finite variance.
 
+use super::share::{self, Kept};
 use super::{UnitContext, tile};
 use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
@@ -29,6 +30,8 @@ pub fn render_tile(
     // Which of the two it is is decided once for the tile: scenes without media run no code for them.
     if c.scene.features.has_media() {
         render::<true>(c, rect, samples, lessons, counters)
+    } else if share::is_of_use(c) {
+        share::render(c, rect, samples, lessons, counters)
     } else {
         render::<false>(c, rect, samples, lessons, counters)
     }
@@ -41,9 +44,10 @@ fn render<const MEDIA: bool>(
     lessons: &mut LightLessons,
     counters: &mut Counters,
 ) -> Option<TileSums> {
+    let mut kept = Kept::default();
     tile::render(c, rect, samples, |s| {
-        let (lessons, counters) = (&mut *lessons, &mut *counters);
-        Walk::<_, MEDIA> { c, lessons, counters, sampler: s.sampler, aov: s.aov }.radiance(s.ray)
+        let (lessons, counters, kept) = (&mut *lessons, &mut *counters, &mut kept);
+        Walk::<_, MEDIA, false> { c, lessons, counters, sampler: s.sampler, aov: s.aov, kept }.radiance(s.ray)
     })
 }
 
@@ -81,20 +85,27 @@ struct Here<'a> {
 }
 
 /// One path, through media or not.
-struct Walk<'a, 'b, S, const MEDIA: bool> {
-    c: &'a UnitContext<'a>,
-    lessons: &'b mut LightLessons,
-    counters: &'b mut Counters,
-    sampler: S,
-    aov: Option<&'b mut Aov>,
+pub(super) struct Walk<'a, 'b, S, const MEDIA: bool, const SHARE: bool> {
+    pub c: &'a UnitContext<'a>,
+    pub lessons: &'b mut LightLessons,
+    pub counters: &'b mut Counters,
+    pub sampler: S,
+    pub aov: Option<&'b mut Aov>,
+    /// Of a path that shares: what it has to share.
+    pub kept: &'b mut Kept,
 }
 
-impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
-    /// Radiance that arrives along a camera ray.
-    fn radiance(&mut self, camera_ray: Ray) -> Rgb {
+impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SHARE> {
+    /// Radiance that arrives along a camera ray. Of a path that shares it is without what its second vertex reflects.
+    pub fn radiance(&mut self, camera_ray: Ray) -> Rgb {
         let scene = self.c.scene;
         let mut total = Rgb::ZERO;
         let mut beta = Rgb::ONE;
+        // What was found and carried before the vertex that is shared, from which on they are counted anew.
+        let (mut before, mut prefix) = (Rgb::ZERO, Rgb::ONE);
+        if SHARE {
+            *self.kept = Kept::default();
+        }
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
         let lens = Anchor::free(camera_ray.o);
@@ -146,6 +157,14 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             if edges == self.c.max_depth {
                 break;
             }
+            if SHARE && edges == 1 {
+                self.kept.first = Some((anchor, scattering));
+            }
+            let shared = SHARE && edges == 2 && self.kept.begin(&anchor, &scattering, -leg.ray.d);
+            if shared {
+                (before, prefix) = (total, beta);
+                (total, beta) = (Rgb::ZERO, Rgb::ONE);
+            }
 
             // Connect to a light.
             if !here.scattering.is_delta_only()
@@ -153,7 +172,13 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
                 && let Some((choice, direct)) = self.next_event(here, &leg)
             {
                 self.add(&mut total, beta, direct);
-                self.lessons.gave(choice.index, choice.pmf, beta * direct);
+                self.lessons.gave(choice.index, choice.pmf, prefix * beta * direct);
+            } else if SHARE {
+                self.kept.lit = None;
+            }
+            if shared {
+                self.kept.connected(total);
+                total = Rgb::ZERO;
             }
 
             // Go on in a direction drawn from the BSDF or the phase function.
@@ -165,6 +190,12 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
                 self.counters.admit(beta);
                 break;
             }
+            if SHARE && edges == 1 && !s.lobe.delta {
+                self.kept.departed = Some((s.f * s.cos_theta, s.pdf));
+            } else if shared {
+                self.kept.departs(s);
+                (prefix, beta) = (prefix * beta, Rgb::ONE);
+            }
             eta_scale *= s.eta * s.eta;
             leg.ray = here.anchor.ray(s.wi);
             leg.arrival = Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta };
@@ -173,17 +204,18 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
             }
 
             // End the path by chance when it carries little.
-            if edges >= self.c.rr_depth {
+            if edges >= self.c.rr_depth && !(SHARE && edges == 1) {
                 let u = self.sampler.next_1d();
+                let carried = prefix * beta * eta_scale;
                 let factor = match here.scattering {
-                    Scattering::Medium(_) if !scene.is_far(here.anchor.p) => roulette_in_medium(beta * eta_scale, u),
-                    _ => roulette(beta * eta_scale, u),
+                    Scattering::Medium(_) if !scene.is_far(here.anchor.p) => roulette_in_medium(carried, u),
+                    _ => roulette(carried, u),
                 };
                 let Some(factor) = factor else { break };
                 beta *= factor;
             }
         }
-        total
+        if SHARE && self.kept.end(total) { before } else { total }
     }
 
     /// Goes on through media to what the ray meets.
@@ -286,6 +318,10 @@ impl<S: Sampler, const MEDIA: bool> Walk<'_, '_, S, MEDIA> {
         let contribution = weighted(pdf_scattering);
         if contribution.is_black() {
             return None;
+        }
+        if SHARE {
+            let weight = if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
+            self.kept.lit = Some((li.wi, li.radiance * (weight / pdf)));
         }
         self.counters.rays += 1;
         (!scene.accel.occluded(&li.shadow_ray(from))).then_some((choice, contribution))

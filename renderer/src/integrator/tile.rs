@@ -20,45 +20,75 @@ pub struct PixelSample<'a> {
     pub aov: Option<&'a mut Aov>,
 }
 
-/// Sums what `radiance` makes of samples `samples` of each pixel of a tile; `None` when stopped.
+/// A tile while its samples are made.
 ///
 /// A sample lies anywhere in its pixel and counts for every pixel whose filter covers it; a pixel is the weighted mean of what counts
 /// for it. Its variance is that of a sample times the integral of the squared filter (4/9 for a tent, 1/pi for a Gaussian of standard
 /// deviation 0.5) where drawing positions from the filter (Ernst, Stamminger and Greiner 2006, "Filter Importance Sampling") has all of
 /// it. Weights do not depend on radiance, so that the expectation is a filtered image still.
+pub struct Tile<'a> {
+    c: &'a UnitContext<'a>,
+    sums: Sums<'a>,
+    /// Of all pixels, or of none.
+    aovs: Vec<Aov>,
+}
+
+impl<'a> Tile<'a> {
+    /// Without samples.
+    pub fn new(c: &'a UnitContext<'a>, rect: Rect) -> Self {
+        let sums = Sums::new(&c.view.filter, rect, (c.view.width, c.view.height));
+        Self { c, sums, aovs: vec![Aov::default(); if c.replicate == 0 { rect.area() } else { 0 }] }
+    }
+
+    /// Begins sample `index` of pixel (x, y): where it is in the picture, and the rest.
+    #[inline(always)]
+    pub fn sample(&mut self, (x, y): (u32, u32), index: u32) -> (Vec2, PixelSample<'_>) {
+        let (c, filter) = (self.c, self.sums.filter);
+        let pixel = u64::from(y) * u64::from(c.view.width) + u64::from(x);
+        let mut sampler = SobolSampler::new(c.seed, c.replicate, pixel, index);
+        let u = sampler.next_2d();
+        let raster = if filter.shares() { inside(x, y, u) } else { filter.sample(u, x, y) };
+        let ray = c.camera_ray(&mut sampler, raster);
+        let rect = &self.sums.rect;
+        let aov = self.aovs.get_mut(((y - rect.y0) * rect.width() + x - rect.x0) as usize);
+        (raster, PixelSample { pixel, index, sampler, ray, aov })
+    }
+
+    /// Adds what came of a sample of pixel (x, y).
+    #[inline(always)]
+    pub fn add(&mut self, (x, y): (u32, u32), raster: Vec2, value: Rgb) {
+        if self.sums.filter.shares() {
+            self.sums.spread(raster, value);
+        } else {
+            self.sums.add(x, y, 1.0, value);
+        }
+    }
+
+    /// The sums of so many samples of each pixel.
+    pub fn finish(self, samples: u32) -> TileSums {
+        self.sums.finish(samples, self.aovs)
+    }
+}
+
+/// Sums what `radiance` makes of samples `samples` of each pixel of a tile; `None` when stopped.
 pub fn render(
     c: &UnitContext<'_>,
     rect: Rect,
     samples: Range<u32>,
     mut radiance: impl FnMut(PixelSample<'_>) -> Rgb,
 ) -> Option<TileSums> {
-    let filter = &c.view.filter;
-    let mut sums = Sums::new(filter, rect, (c.view.width, c.view.height));
-    let mut aovs = Vec::with_capacity(if c.replicate == 0 { rect.area() } else { 0 });
+    let mut tile = Tile::new(c, rect);
     for (x, y) in rect.pixels() {
         if x == rect.x0 && (c.stopped)() {
             return None;
         }
-        let mut aov = Aov::default();
-        let pixel = u64::from(y) * u64::from(c.view.width) + u64::from(x);
         for index in samples.clone() {
-            let mut sampler = SobolSampler::new(c.seed, c.replicate, pixel, index);
-            let u = sampler.next_2d();
-            let raster = if filter.shares() { inside(x, y, u) } else { filter.sample(u, x, y) };
-            let ray = c.camera_ray(&mut sampler, raster);
-            let aov = (c.replicate == 0).then_some(&mut aov);
-            let value = radiance(PixelSample { pixel, index, sampler, ray, aov });
-            if filter.shares() {
-                sums.spread(raster, value);
-            } else {
-                sums.add(x, y, 1.0, value);
-            }
-        }
-        if c.replicate == 0 {
-            aovs.push(aov);
+            let (raster, sample) = tile.sample((x, y), index);
+            let value = radiance(sample);
+            tile.add((x, y), raster, value);
         }
     }
-    Some(sums.finish(samples.end - samples.start, aovs))
+    Some(tile.finish(samples.end - samples.start))
 }
 
 /// A place in pixel (x, y); rounding must not lead into the next.

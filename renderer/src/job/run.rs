@@ -101,6 +101,7 @@ fn run(
         carried,
         rr_depth: settings.rr_depth,
         threshold: plan.threshold,
+        share: settings.share,
         selector: learned.as_ref().unwrap_or(&scene.selector),
         stopped: &|| stop.stopped(),
     };
@@ -178,6 +179,7 @@ pub fn render_strategies(
             carried: Carried::ALL,
             rr_depth: u32::MAX,
             threshold: 0.0,
+            share: false,
             selector: &scene.selector,
             stopped: &|| stop.stopped(),
         };

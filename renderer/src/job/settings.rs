@@ -45,6 +45,8 @@ pub struct RenderSettings {
     pub replicates: u32,
     /// Whether `path` gives noisy tiles more samples.
     pub adaptive: bool,
+    /// Whether paths of `path` share their second vertices with the pixels around, where that pays.
+    pub share: bool,
     /// How chains run.
     pub mmlt: MmltOptions,
 }
@@ -66,6 +68,8 @@ pub struct RenderOptions {
     pub target_error: Option<f64>,
     /// `--adaptive`
     pub adaptive: Option<bool>,
+    /// `--share`
+    pub share: Option<bool>,
     /// `--size`
     pub size: Option<(u32, u32)>,
     /// `--max-depth`
@@ -94,6 +98,12 @@ impl RenderOptions {
             let name = integrator.name();
             return Err(format!(
                 "--adaptive is for path, but {name} would render; leave it out, or give --integrator path"
+            ));
+        }
+        if self.share == Some(true) && !matches!(integrator, IntegratorKind::Path | IntegratorKind::Auto) {
+            let name = integrator.name();
+            return Err(format!(
+                "--share is for path, but {name} would render; leave it out, or give --integrator path"
             ));
         }
         self.mmlt.map_or(Ok(()), |o| o.validate())?;
@@ -142,6 +152,7 @@ impl RenderSettings {
             seed: options.seed.or(scene.seed).unwrap_or(0),
             replicates: groups(integrator, &budget),
             adaptive: options.adaptive.unwrap_or(budget.target_error.is_some()),
+            share: options.share.unwrap_or(true),
             mmlt: options.mmlt.unwrap_or_default(),
         };
         settings.validate()?;

@@ -55,6 +55,7 @@ fn strategies_without_weights_agree_with_each_other_and_with_their_weighted_sum(
         carried: Carried::ALL,
         rr_depth: u32::MAX,
         threshold: 0.0,
+        share: false,
         selector: &scene.selector,
         stopped: &|| false,
     };

@@ -98,3 +98,18 @@ pub fn assert_same_mean(a: &MergedImage, b: &MergedImage, share: f64, what: &str
     let tolerance = half.max(2e-6 * ea.mean.abs());
     assert!((ea.mean - eb.mean).abs() <= tolerance, "{what}: {} and {} differ by more than {half}", ea.mean, eb.mean);
 }
+
+/// Squared relative deviations of pixels from the mean of all renders (as of one that took no part in it), and the squares of the
+/// errors that they tell: sums over the picture, by render.
+pub fn deviations(renders: &[MergedImage]) -> (Vec<f64>, Vec<f64>) {
+    let n = renders.len() as f64;
+    let pixels = renders[0].mean.len();
+    let mean: Vec<f64> =
+        (0..pixels).map(|i| renders.iter().map(|r| f64::from(r.mean[i][1])).sum::<f64>() / n).collect();
+    let relative = |i: usize, v: f64| v * v / (mean[i] * mean[i] + 0.01);
+    let true_of = |r: &MergedImage| {
+        (0..pixels).map(|i| relative(i, f64::from(r.mean[i][1]) - mean[i])).sum::<f64>() * n / (n - 1.0)
+    };
+    let told = |r: &MergedImage| (0..pixels).map(|i| relative(i, f64::from(r.std_error[i][1]))).sum();
+    (renders.iter().map(true_of).collect(), renders.iter().map(told).collect())
+}

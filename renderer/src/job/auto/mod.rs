@@ -42,9 +42,11 @@ const MUTATIONS: u32 = 4;
 const EASY: f64 = 0.2;
 
 /// What is tried, in this order.
-const TRIED: [Tried; 5] = [Tried::Path, Tried::Bdpt, Tried::Moments, Tried::Direct, Tried::Mmlt];
+const TRIED: [Tried; 6] = [Tried::Path, Tried::Alone, Tried::Bdpt, Tried::Moments, Tried::Direct, Tried::Mmlt];
 /// Trials that tell of path and bdpt.
-const WITHOUT_CHAINS: usize = 3;
+const WITHOUT_CHAINS: usize = 4;
+/// What a ray costs that takes a second vertex of one path to the first of another, over others of `path`.
+const JOIN: f64 = 0.55;
 /// How much better chains must look: what a short trial says of them is the least certain.
 const MARGIN: f64 = 1.3;
 
@@ -53,6 +55,8 @@ const MARGIN: f64 = 1.3;
 enum Tried {
     /// By `path`.
     Path,
+    /// By `path` whose pixels share nothing, to be compared with what it would find seldom.
+    Alone,
     /// By `bdpt`.
     Bdpt,
     /// What `path` would find seldom.
@@ -66,7 +70,7 @@ enum Tried {
 impl Tried {
     fn integrator(self) -> IntegratorKind {
         match self {
-            Self::Path | Self::Direct => IntegratorKind::Path,
+            Self::Path | Self::Alone | Self::Direct => IntegratorKind::Path,
             Self::Bdpt => IntegratorKind::Bdpt,
             Self::Moments => IntegratorKind::Moments,
             Self::Mmlt => IntegratorKind::Mmlt,
@@ -221,6 +225,7 @@ fn trial(job: &RenderSettings, tried: Tried) -> RenderSettings {
         replicates: GROUPS,
         ..job.rendered_by(integrator, Some(spp))
     };
+    settings.share &= tried != Tried::Alone;
     if tried == Tried::Direct {
         let direct = job.mmlt.direct_edges;
         settings.max_depth = Some(job.max_depth.map_or(direct, |n| n.min(direct)));
@@ -236,18 +241,23 @@ fn trial(job: &RenderSettings, tried: Tried) -> RenderSettings {
 
 /// What the trials so far show.
 fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
-    let [path, bdpt, moments, ..] = trials else { return Vec::new() };
+    let [path, alone, bdpt, moments, ..] = trials else { return Vec::new() };
     let (path_sample, bdpt_sample) = (Sample::new(path, Part::Whole), Sample::new(bdpt, Part::Whole));
     let weights = bdpt_sample.weights(&path_sample);
     let of_group = |r: &Rendering| f64::from(r.done_spp()) / f64::from(GROUPS);
-    let unit = work_of(&path.spent().samples, IntegratorKind::Path) / path.spent().samples.samples as f64;
+    let each = |c: &Counters, kind| if c.samples == 0 { 0.0 } else { work_of(c, kind) / c.samples as f64 };
+    let unit = {
+        let of = |r: &Rendering| each(&r.spent().samples, IntegratorKind::Path);
+        of(alone) + JOIN * (of(path) - of(alone)).max(0.0)
+    };
     // What its own trial shows, or bidirectional samples of what it would find seldom, or has to miss.
     let seen = path_sample.relative_variance(&weights, false) * of_group(path);
     let s = path.settings();
     let spread = Filter::new(&s.filter, s.width, s.height).spread();
     let known = spread * Sample::new(moments, Part::Whole).relative_moment(&weights, [&path_sample, &bdpt_sample]);
-    let unseen = (known - seen).max(0.0) + path_sample.unseen(&bdpt_sample, f64::from(path.done_spp()));
-    let own = |r: &Rendering, kind| work_of(&r.spent().samples, kind) / r.spent().samples.samples as f64 / unit;
+    let seen_alone = Sample::new(alone, Part::Whole).relative_variance(&weights, false) * of_group(alone);
+    let unseen = (known - seen_alone.max(seen)).max(0.0) + path_sample.unseen(&bdpt_sample, f64::from(path.done_spp()));
+    let own = |r: &Rendering, kind| each(&r.spent().samples, kind) / unit;
     let mut outcomes = vec![
         Outcome { integrator: IntegratorKind::Path, variance: seen + unseen, unseen, work: 1.0 },
         Outcome {
@@ -257,7 +267,7 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
             work: own(bdpt, IntegratorKind::Bdpt),
         },
     ];
-    if let [_, _, _, samples, mmlt] = trials {
+    if let [_, _, _, _, samples, mmlt] = trials {
         let s = mmlt.settings();
         let splats = Sample::new(mmlt, Part::Splats);
         let direct = f64::from(s.mmlt.direct_share);
@@ -267,11 +277,9 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
         let whole = Sample::new(mmlt, Part::Whole);
         let unseen = whole.unseen(&bdpt_sample, f64::from(mmlt.done_spp()));
         let spent = mmlt.spent();
-        let each =
-            |c: &Counters| if c.samples == 0 { 0.0 } else { work_of(c, IntegratorKind::Mmlt) / c.samples as f64 };
-        let work = metropolis::chain_share(s) * each(&spent.chains)
-            + metropolis::pools_per_mutation(s) * each(&spent.pools)
-            + direct * work_of(&spent.samples, IntegratorKind::Path) / spent.samples.samples.max(1) as f64;
+        let work = metropolis::chain_share(s) * each(&spent.chains, IntegratorKind::Mmlt)
+            + metropolis::pools_per_mutation(s) * each(&spent.pools, IntegratorKind::Mmlt)
+            + direct * each(&spent.samples, IntegratorKind::Path);
         let variance = of_mutations + of_samples + unseen;
         outcomes.push(Outcome { integrator: IntegratorKind::Mmlt, variance, unseen, work: work / unit });
     }
