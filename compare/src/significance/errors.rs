@@ -37,12 +37,13 @@ impl Errors {
         let square = |v: Vec<[f32; 3]>| v.into_iter().map(|p| p.map(|s| s * s)).collect();
         let own = p.metadata.as_ref().and_then(|m| {
             let filter = FilterDesc::deserialize(&m.settings["filter"]).ok();
-            m.channels.map(|image| (image, &m.settings["integrator"], filter))
+            let apart = m.settings["integrator"] == "path" && m.settings["share"] != true;
+            m.channels.map(|image| (image, apart, filter))
         });
         match (own, layer("blockerror"), layer("stderror")) {
-            // Pixels of a path tracer share samples in a known way, if at all: hundreds of pixel errors tell a block's error better
-            // than its own few groups do, whose chance of being far too small the t-test of two images underrates.
-            (Some((image, kind, own)), _, Some(errors)) if kind == "path" => {
+            // Pixels of a path tracer that do not share paths share samples in a known way, if at all: hundreds of pixel errors tell a
+            // block's error better than its own few groups do, whose chance of being far too small the t-test of two images underrates.
+            (Some((image, true, own)), _, Some(errors)) => {
                 let filter = Filter::new(&own.unwrap_or(PIXEL), p.width, p.height);
                 let name = format!("pixel errors of {} replicate groups", image.groups);
                 let dof = f64::from(image.groups) - 1.0;

@@ -21,8 +21,8 @@ const KEEPING: f64 = 1.1;
 const ALIKE: f32 = 0.95;
 /// Side of the regions whose brightness is taken to be one, in pixels.
 const REGION: u32 = 16;
-/// Keeps relative errors from dividing by the darkness of black pixels, as in the error that is told.
-const FLOOR: f64 = 0.01;
+/// Keeps relative errors from dividing by the darkness of black regions: this share of the tile's brightness, whatever its scale.
+const FLOOR: f64 = 0.1;
 /// Of so many strips one is watched.
 const WATCHED: u32 = 4;
 /// Height of a strip in pixels.
@@ -30,8 +30,7 @@ const STRIP: u32 = 4;
 
 /// Measures, for the samples of a tile so far, the variance of what paths can share and of what they can't, and what it costs.
 ///
-/// Both are measured as the difference of neighbours on the same kind of surface, relative to the brightness of the region as in the
-/// error that is told of an image. The tile is cut into bands, and what is watched in every other of them decides for those between:
+/// Both are measured as the difference of neighbours on the same kind of surface, relative to the brightness of the region. The tile is cut into bands, and what is watched in every other of them decides for those between:
 /// samples of a pixel depend on one another, as together they fill the space of numbers evenly, so that none of them may decide for the
 /// others. (Before the first of them all that was watched may.) Which pixels are watched is fixed, and what is watched does not depend
 /// on what is shared.
@@ -166,8 +165,10 @@ impl Gauge {
         if samples == 0.0 {
             return FIRST;
         }
+        let regions = || deciding.clone().flat_map(|h| &h.regions);
+        let floor = FLOOR * regions().map(|r| r.brightness).sum::<f64>() / samples;
         let sum = |sum: (f64, f64), region: (f64, f64)| (sum.0 + region.0, sum.1 + region.1);
-        let (own, reflected) = deciding.clone().flat_map(|h| &h.regions).map(Region::relative).fold((0.0, 0.0), sum);
+        let (own, reflected) = regions().map(|r| r.relative(floor)).fold((0.0, 0.0), sum);
         let work = |(side, gain): (&u32, &f64)| {
             let joins = shared * f64::from(side * side - 1);
             let cost = samples * SAMPLE + rays + JOIN * joins;
@@ -181,11 +182,11 @@ impl Gauge {
 }
 
 impl Region {
-    /// Its squared differences relative to its brightness.
-    fn relative(&self) -> (f64, f64) {
+    /// Its squared differences relative to its brightness, which counts as `floor` at least.
+    fn relative(&self, floor: f64) -> (f64, f64) {
         let mean = if self.samples > 0.0 { self.brightness / self.samples } else { 0.0 };
-        let weight = 1.0 / (mean * mean + FLOOR);
-        (self.own * weight, self.reflected * weight)
+        let level = mean.max(floor);
+        if level > 0.0 { (self.own / (level * level), self.reflected / (level * level)) } else { (0.0, 0.0) }
     }
 }
 

@@ -90,7 +90,7 @@ pub fn triangles(probe: &mut Probe) {
         }
     }
     let Some(reference) = reference else { return };
-    let many = probe.pick(3000, 400_000);
+    let many = probe.pick(3000, 100_000);
     for (what, floor, lamp_mesh) in
         [("strips", strips(1.5, many), strips(0.5, 300)), ("fan", fan(1.5, many), fan(0.5, 300))]
     {
