@@ -111,12 +111,17 @@ impl Session<'_> {
     fn run(&self, kinds: &[IntegratorKind], rows: &mut Vec<Row>) -> Result<(), String> {
         let path = self.render(IntegratorKind::Path, None)?;
         let reference = path.picture();
-        rows.push(self.row(&path, IntegratorKind::Path, None));
+        rows.push(self.row(&path, IntegratorKind::Path.name(), None));
         self.known(&path, IntegratorKind::Path, rows)?;
+        if !self.scene.features.has_media() {
+            let shared = self.task(IntegratorKind::Path, None, true).run(&self.effort)?;
+            let comparison = compare(&shared.image, &shared.picture(), &reference);
+            rows.push(self.row(&shared, "shared", Some(("path".into(), comparison))));
+        }
         for &kind in kinds.iter().filter(|k| **k != IntegratorKind::Light || self.case.light) {
             let own = self.render(kind, None)?;
             let comparison = compare(&own.image, &own.picture(), &reference);
-            rows.push(self.row(&own, kind, Some(("path".into(), comparison))));
+            rows.push(self.row(&own, kind.name(), Some(("path".into(), comparison))));
             self.known(&own, kind, rows)?;
         }
         Ok(())
@@ -129,7 +134,7 @@ impl Session<'_> {
             let truth = exact(depth);
             let comparison = compare(&own.image, &own.picture(), &Picture::Exact(truth));
             let name = depth.map_or(format!("{truth}"), |d| format!("{truth} to depth {d}"));
-            rows.push(self.row(own, kind, Some((name, comparison))));
+            rows.push(self.row(own, kind.name(), Some((name, comparison))));
         };
         test(own, None);
         test(&self.render(kind, Some(SHALLOW))?, Some(SHALLOW));
@@ -137,29 +142,34 @@ impl Session<'_> {
     }
 
     fn render(&self, kind: IntegratorKind, max_depth: Option<u32>) -> Result<Rendering, String> {
-        // No two integrators share a random number.
+        self.task(kind, max_depth, false).run(&self.effort)
+    }
+
+    fn task(&self, kind: IntegratorKind, max_depth: Option<u32>, share: bool) -> Task<'_> {
+        // No two of them share a random number.
         let number = IntegratorKind::ALL.iter().position(|(_, k)| *k == kind).unwrap_or_default() as u64;
-        let task = Task {
+        let number = if share { IntegratorKind::ALL.len() as u64 } else { number };
+        Task {
             scene: &self.scene,
             kind,
+            share,
             size: self.case.size,
             max_depth,
             seed: self.args.seed << 6 | number,
             threads: self.args.threads,
-        };
-        task.run(&self.effort)
+        }
     }
 
-    fn row(&self, own: &Rendering, kind: IntegratorKind, against: Option<(String, Comparison)>) -> Row {
+    fn row(&self, own: &Rendering, integrator: &'static str, against: Option<(String, Comparison)>) -> Row {
         let (against, comparison) = against.unzip();
         let row = Row {
             scene: self.case.name.clone(),
-            integrator: kind.name(),
+            integrator,
             against,
             spp: own.spp,
             seconds: own.seconds,
             half_width: own.picture().half_width(),
-            required: self.effort.limits(kind).required,
+            required: self.effort.limits(integrator == IntegratorKind::Mmlt.name()).required,
             dropped: own.image.counters.non_finite + own.image.counters.negative,
             comparison,
             verdict: report::Verdict::Agrees,

@@ -1,7 +1,6 @@
 //! What is known of a picture: means with their errors.
 
 use renderer::film::{ERROR_BLOCK, Filter, MergedImage};
-use renderer::integrator::IntegratorKind;
 use statcheck::Estimate;
 
 /// How far a pixel's filter reaches, in pixels: that of the default filter.
@@ -10,8 +9,8 @@ const REACH: u32 = 2;
 /// A picture whose means can be tested.
 #[derive(Clone, Copy, Debug)]
 pub enum Picture<'a> {
-    /// What an integrator estimates.
-    Rendered(&'a MergedImage, IntegratorKind, &'a Filter),
+    /// What an integrator estimates; with its filter, if its pixels are independent but for that.
+    Rendered(&'a MergedImage, Option<&'a Filter>),
     /// The same radiance in every pixel, known exactly.
     Exact(f64),
 }
@@ -49,18 +48,18 @@ impl Area {
 impl Picture<'_> {
     /// The mean over the image or one of its blocks.
     ///
-    /// Pixels of a path tracer share samples in a way that the filter tells: their errors add up to the area's. Those of splatted pixels
-    /// don't; there the scatter of the whole area between the replicate groups tells the error.
+    /// Pixels of a path tracer share samples in a way that the filter tells: their errors add up to the area's. Those of splatted pixels,
+    /// and of pixels that share paths, don't; there the scatter of the whole area between the replicate groups tells the error.
     pub fn area(&self, area: Area, channel: usize) -> Estimate {
-        let (image, kind, filter) = match *self {
+        let (image, filter) = match *self {
             Self::Exact(radiance) => return Estimate::exact(radiance),
-            Self::Rendered(image, kind, filter) => (image, kind, filter),
+            Self::Rendered(image, filter) => (image, filter),
         };
         let pixels = || area.pixels(image.width);
         let mean = pixels().map(|i| f64::from(image.mean[i][channel])).sum::<f64>() / pixels().count() as f64;
         let dof = self.dof();
         let square = |e: f64| e * e;
-        if kind == IntegratorKind::Path {
+        if let Some(filter) = filter {
             let variances = pixels().map(|i| square(f64::from(image.std_error[i][channel])));
             let [x, y] = [0, 1].map(|axis| area.from[axis]..area.to[axis]);
             return Estimate::pooled(mean, variances, dof, filter.inflation(0, &x) * filter.inflation(1, &y));
