@@ -43,6 +43,11 @@ impl Estimate {
         Self { mean, variance: sum * inflation / (n * n), dof }
     }
 
+    /// With the error of another estimate of the same mean, if that is larger.
+    pub fn at_least(self, other: Option<Self>) -> Self {
+        other.filter(|o| o.variance > self.variance).unwrap_or(self)
+    }
+
     /// Half the width of the two-sided interval that holds the true mean with this probability.
     pub fn half_width(&self, confidence: f64) -> f64 {
         student_quantile(0.5 + 0.5 * confidence, self.dof) * self.variance.sqrt()
@@ -103,6 +108,14 @@ mod tests {
         // The interval ends where the test begins to reject.
         let end = Estimate::exact(a.mean() + estimate(&a).half_width(0.99));
         assert!((estimate(&a).welch(&end, 0.0).unwrap().p - 0.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_larger_error_counts() {
+        let with = |variance| Estimate { mean: 1.0, variance, dof: 7.0 };
+        assert_eq!(with(2.0).at_least(None), with(2.0));
+        assert_eq!(with(2.0).at_least(Some(with(1.0))), with(2.0));
+        assert_eq!(with(2.0).at_least(Some(with(3.0))), with(3.0));
     }
 
     #[test]

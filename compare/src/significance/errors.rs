@@ -22,8 +22,8 @@ const PIXEL: FilterDesc = FilterDesc::Box { radius: 0.5 };
 
 /// What a file knows of its error.
 pub(super) enum Errors {
-    /// Standard errors of blocks (at each pixel) and of the image, from groups.
-    Groups { block: Vec<[f32; 3]>, image: ChannelMeans },
+    /// Standard errors of blocks (at each pixel) and of the image, from groups; what they are at least, if that is known.
+    Groups { block: Vec<[f32; 3]>, image: ChannelMeans, least: Option<Box<Self>> },
     /// Variance of each pixel; how much larger the variance of a block's mean is than that of independent pixels, by axis.
     Pixels { variance: Vec<[f32; 3]>, dof: f64, filter: Filter, name: String },
 }
@@ -37,19 +37,24 @@ impl Errors {
         let square = |v: Vec<[f32; 3]>| v.into_iter().map(|p| p.map(|s| s * s)).collect();
         let own = p.metadata.as_ref().and_then(|m| {
             let filter = FilterDesc::deserialize(&m.settings["filter"]).ok();
-            let apart = m.settings["integrator"] == "path" && m.settings["share"] != true;
-            m.channels.map(|image| (image, apart, filter))
+            let path = m.settings["integrator"] == "path";
+            m.channels.map(|image| (image, path, m.settings["share"] == true, filter))
         });
         match (own, layer("blockerror"), layer("stderror")) {
-            // Pixels of a path tracer that do not share paths share samples in a known way, if at all: hundreds of pixel errors tell a
-            // block's error better than its own few groups do, whose chance of being far too small the t-test of two images underrates.
-            (Some((image, true, own)), _, Some(errors)) => {
+            // Pixels of a path tracer share samples in a known way, if at all: hundreds of pixel errors tell a block's error better
+            // than its own few groups do, whose chance of being far too small the t-test of two images underrates. Where they share
+            // paths as well, it is at least that.
+            (Some((image, true, shares, own)), block, Some(errors)) => {
                 let filter = Filter::new(&own.unwrap_or(PIXEL), p.width, p.height);
                 let name = format!("pixel errors of {} replicate groups", image.groups);
                 let dof = f64::from(image.groups) - 1.0;
-                return Some(Self::Pixels { variance: square(errors), dof, filter, name });
+                let pixels = Self::Pixels { variance: square(errors), dof, filter, name };
+                return Some(match block {
+                    Some(block) if shares => Self::Groups { block, image, least: Some(Box::new(pixels)) },
+                    _ => pixels,
+                });
             }
-            (Some((image, ..)), Some(block), _) => return Some(Self::Groups { block, image }),
+            (Some((image, ..)), Some(block), _) => return Some(Self::Groups { block, image, least: None }),
             _ => {}
         }
         let variance = layer("variance").or_else(|| layer("stderror").map(square))?;
@@ -72,9 +77,10 @@ impl Errors {
     /// The `mean` over a block, with its error.
     pub(super) fn block(&self, mean: f64, width: u32, x: &Range<u32>, y: &Range<u32>, c: usize) -> Estimate {
         match self {
-            Self::Groups { block, image } => {
+            Self::Groups { block, image, least } => {
                 let se = f64::from(block[(y.start * width + x.start) as usize][c]);
-                Estimate { mean, variance: se * se, dof: f64::from(image.groups) - 1.0 }
+                let own = Estimate { mean, variance: se * se, dof: f64::from(image.groups) - 1.0 };
+                own.at_least(least.as_ref().map(|l| l.block(mean, width, x, y, c)))
             }
             Self::Pixels { variance, dof, filter, .. } => {
                 let pixels = y.clone().flat_map(|y| x.clone().map(move |x| (y * width + x) as usize));
@@ -87,9 +93,10 @@ impl Errors {
     /// The `mean` over the image, with its error.
     pub(super) fn image(&self, mean: f64, width: u32, height: u32, c: usize) -> Estimate {
         match self {
-            Self::Groups { image, .. } => {
+            Self::Groups { image, least, .. } => {
                 let variance = image.std_error[c] * image.std_error[c];
-                Estimate { mean, variance, dof: f64::from(image.groups) - 1.0 }
+                let own = Estimate { mean, variance, dof: f64::from(image.groups) - 1.0 };
+                own.at_least(least.as_ref().map(|l| l.image(mean, width, height, c)))
             }
             Self::Pixels { .. } => self.block(mean, width, &(0..width), &(0..height), c),
         }
