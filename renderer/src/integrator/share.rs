@@ -311,6 +311,14 @@ impl Block<'_, '_> {
             let radiance = if k == j { second.radiance } else { second.radiance_towards(-w) };
             self.joined.push((k, value * radiance, to_area));
         }
+        if !(density > 0.0 && density.is_finite()) {
+            // Edge-on, or too near to tell from the first vertex: its own path's, as if it were alone.
+            let alone = self.pixels[j].kept.unshared();
+            if self.counters.admit(alone) {
+                self.pixels[j].value += alone;
+            }
+            return;
+        }
         for &(k, value, to_area) in &self.joined {
             let share = value * (to_area / density) as f32;
             if self.counters.admit(share) {
