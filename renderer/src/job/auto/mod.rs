@@ -256,7 +256,9 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
     let spread = Filter::new(&s.filter, s.width, s.height).spread();
     let known = spread * Sample::new(moments, Part::Whole).relative_moment(&weights, [&path_sample, &bdpt_sample]);
     let seen_alone = Sample::new(alone, Part::Whole).relative_variance(&weights, false) * of_group(alone);
-    let unseen = (known - seen_alone.max(seen)).max(0.0) + path_sample.unseen(&bdpt_sample, f64::from(path.done_spp()));
+    // What sharing takes from the noise that is seen it takes from that which is not, as far as is known.
+    let left = if seen_alone > 0.0 { (seen / seen_alone).min(1.0) } else { 1.0 };
+    let unseen = left * (known - seen_alone).max(0.0) + path_sample.unseen(&bdpt_sample, f64::from(path.done_spp()));
     let own = |r: &Rendering, kind| each(&r.spent().samples, kind) / unit;
     let mut outcomes = vec![
         Outcome { integrator: IntegratorKind::Path, variance: seen + unseen, unseen, work: 1.0 },
