@@ -160,16 +160,16 @@ impl Session<'_> {
         }
     }
 
-    fn row(&self, own: &Rendering, integrator: &'static str, against: Option<(String, Comparison)>) -> Row {
+    fn row(&self, own: &Rendering, name: &'static str, against: Option<(String, Comparison)>) -> Row {
         let (against, comparison) = against.unzip();
         let row = Row {
             scene: self.case.name.clone(),
-            integrator,
+            integrator: name,
             against,
             spp: own.spp,
             seconds: own.seconds,
             half_width: own.picture().half_width(),
-            required: self.effort.limits(integrator == IntegratorKind::Mmlt.name()).required,
+            required: self.effort.limits(own.kind).required,
             dropped: own.image.counters.non_finite + own.image.counters.negative,
             comparison,
             verdict: report::Verdict::Agrees,

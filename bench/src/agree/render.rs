@@ -8,7 +8,7 @@ use renderer::scene::Scene;
 use std::time::Instant;
 
 /// Least number of replicate groups where pixels share paths.
-const SPLAT_GROUPS: u32 = 16;
+const SHARED_GROUPS: u32 = 16;
 
 /// How much is rendered. It follows from what is in the pictures, never from a clock, so that the verdict does not either.
 #[derive(Clone, Copy, Debug)]
@@ -35,9 +35,9 @@ pub struct Limits {
 }
 
 impl Effort {
-    /// The limits of an integrator, which makes chains or does not.
-    pub fn limits(&self, chains: bool) -> Limits {
-        if chains { self.chains } else { self.samples }
+    /// The limits of an integrator.
+    pub fn limits(&self, kind: IntegratorKind) -> Limits {
+        if kind == IntegratorKind::Mmlt { self.chains } else { self.samples }
     }
 }
 
@@ -46,6 +46,8 @@ impl Effort {
 pub struct Rendering {
     /// The picture.
     pub image: MergedImage,
+    /// What made it.
+    pub kind: IntegratorKind,
     /// How its pixels share samples, if that is all that they share.
     pub filter: Option<Filter>,
     /// Samples (mutations) per pixel.
@@ -90,12 +92,10 @@ impl Task<'_> {
         let rays_per_spp = pilot.image.counters.rays as f64 / f64::from(effort.pilot_spp);
         let needed = f64::from(effort.pilot_spp) * (half / effort.aim) * (half / effort.aim);
         // NaN, where the pilot could not tell, takes all that is allowed.
-        let spp = needed
-            .min(effort.limits(self.kind == IntegratorKind::Mmlt).rays / rays_per_spp.max(1.0))
-            .max(f64::from(effort.least_spp));
+        let spp = needed.min(effort.limits(self.kind).rays / rays_per_spp.max(1.0)).max(f64::from(effort.least_spp));
         // Whole samples for each group.
-        let groups = f64::from(SPLAT_GROUPS);
-        self.render((spp / groups).ceil().min(1e6) as u32 * SPLAT_GROUPS, self.seed)
+        let groups = f64::from(SHARED_GROUPS);
+        self.render((spp / groups).ceil().min(1e6) as u32 * SHARED_GROUPS, self.seed)
     }
 
     fn render(&self, spp: u32, seed: u64) -> Result<Rendering, String> {
@@ -110,13 +110,13 @@ impl Task<'_> {
         let apart = self.kind == IntegratorKind::Path && !self.share;
         if !apart {
             // The errors of areas whose pixels share paths have no more degrees of freedom than there are groups.
-            settings.replicates = settings.replicates.max(SPLAT_GROUPS);
+            settings.replicates = settings.replicates.max(SHARED_GROUPS);
         }
         let started = Instant::now();
         let options = LocalOptions { threads: self.threads };
         let outcome =
             render_local(self.scene, &settings, &options, &Stop::new(), &mut |_| {}).map_err(|e| e.to_string())?;
         let filter = apart.then(|| Filter::new(&settings.filter, settings.width, settings.height));
-        Ok(Rendering { image: outcome.image, filter, spp, seconds: started.elapsed().as_secs_f64() })
+        Ok(Rendering { image: outcome.image, kind: self.kind, filter, spp, seconds: started.elapsed().as_secs_f64() })
     }
 }

@@ -11,7 +11,7 @@ const SIDES: [u32; 7] = [8, 6, 5, 4, 3, 2, 1];
 const FIRST: u32 = 2;
 /// What a join costs, over a ray of a path with what is computed where it arrives: a shadow ray and the value of a BSDF. As measured on
 /// scenes of 36 to 57,000 triangles.
-const JOIN: f64 = 0.55;
+pub const JOIN: f64 = 0.55;
 /// What a sample costs beside its rays, in the same unit: numbers, camera ray, film.
 const SAMPLE: f64 = 1.0;
 /// So much must be gained at least: it costs something to keep what may be shared, and what is gained is a guess.
@@ -30,10 +30,10 @@ const STRIP: u32 = 4;
 
 /// Measures, for the samples of a tile so far, the variance of what paths can share and of what they can't, and what it costs.
 ///
-/// Both are measured as the difference of neighbours on the same kind of surface, relative to the brightness of the region. The tile is cut into bands, and what is watched in every other of them decides for those between:
-/// samples of a pixel depend on one another, as together they fill the space of numbers evenly, so that none of them may decide for the
-/// others. (Before the first of them all that was watched may.) Which pixels are watched is fixed, and what is watched does not depend
-/// on what is shared.
+/// Both are measured as the difference of neighbours on the same kind of surface, relative to the brightness of the region. The tile is
+/// cut into bands, and what is watched in every other of them decides for those between: samples of a pixel depend on one another, as
+/// together they fill the space of numbers evenly, so that none of them may decide for the others. (Before the first of them all that was
+/// watched may.) Which pixels are watched is fixed, and what is watched does not depend on what is shared.
 pub(super) struct Gauge {
     /// For each of [`SIDES`] the variance of a pixel by what is shared, over that by what is not.
     gains: [f64; SIDES.len()],

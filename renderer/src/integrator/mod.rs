@@ -12,6 +12,7 @@ pub mod strategies;
 mod tile;
 
 pub use context::{Carried, UnitContext, View};
+pub use gauge::JOIN;
 
 use serde::{Deserialize, Serialize};
 

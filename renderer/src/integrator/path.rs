@@ -305,10 +305,8 @@ impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SH
         }
         let cos = scattering.abs_cos(li.wi);
         let pdf = li.pdf * choice.pmf;
-        let weighted = |pdf_scattering: f32| {
-            let weight = if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
-            f * li.radiance * (cos * weight / pdf)
-        };
+        let weight = |pdf_scattering: f32| if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
+        let weighted = |pdf_scattering: f32| f * li.radiance * (cos * weight(pdf_scattering) / pdf);
         if MEDIA {
             let around = scene.beside(object, from, li.wi, &leg.around);
             let through = scene.transmission(from, &li.into(), around, &mut self.counters.rays)?;
@@ -320,8 +318,7 @@ impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SH
             return None;
         }
         if SHARE {
-            let weight = if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
-            self.kept.lit = Some((li.wi, li.radiance * (weight / pdf)));
+            self.kept.lit = Some((li.wi, li.radiance * (weight(pdf_scattering) / pdf)));
         }
         self.counters.rays += 1;
         (!scene.accel.occluded(&li.shadow_ray(from))).then_some((choice, contribution))

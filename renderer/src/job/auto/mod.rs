@@ -15,7 +15,7 @@ use super::metropolis;
 use super::rendering::Rendering;
 use super::settings::{Budget, RenderSettings};
 use crate::film::{Counters, Filter};
-use crate::integrator::IntegratorKind;
+use crate::integrator::{IntegratorKind, JOIN};
 use crate::sampling::hash_words;
 use measure::{Part, Sample};
 use serde::{Deserialize, Serialize};
@@ -45,8 +45,6 @@ const EASY: f64 = 0.2;
 const TRIED: [Tried; 6] = [Tried::Path, Tried::Alone, Tried::Bdpt, Tried::Moments, Tried::Direct, Tried::Mmlt];
 /// Trials that tell of path and bdpt.
 const WITHOUT_CHAINS: usize = 4;
-/// What a ray costs that takes a second vertex of one path to the first of another, over others of `path`.
-const JOIN: f64 = 0.55;
 /// How much better chains must look: what a short trial says of them is the least certain.
 const MARGIN: f64 = 1.3;
 
