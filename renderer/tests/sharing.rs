@@ -1,4 +1,5 @@
-//! Pixels that share their paths: the same image, with less noise, and the error that is told is the true one.
+//! Pixels that share their paths, and chains whose paths count for the pixels around: the same image, with less noise, and the error that
+//! is told is the true one.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
@@ -8,11 +9,12 @@ use common::{camera, deviations, emission, lambert, render_with, shape};
 use renderer::bsdf::{Material, MaterialId};
 use renderer::film::MergedImage;
 use renderer::integrator::IntegratorKind;
+use renderer::integrator::mmlt::MmltOptions;
 use renderer::job::{RenderOptions, RenderSettings};
 use renderer::light::{LightDesc, SpotFalloff};
 use renderer::math::{DAffine3, DMat3, DVec3};
 use renderer::scene::Scene;
-use renderer::scene::desc::{RenderDefaults, SceneDesc, ShapeDesc, ShapeKind};
+use renderer::scene::desc::{CameraDesc, RenderDefaults, SceneDesc, ShapeDesc, ShapeKind};
 use renderer::spectrum::Rgb;
 use renderer::texture::{FloatParam, RgbParam};
 use statcheck::{Mean, sidak, welch_test};
@@ -52,8 +54,8 @@ fn ball(p: DVec3, radius: f64, material: u32) -> ShapeDesc {
 }
 
 /// A room of all kinds of surfaces: diffuse ones, seen from both sides, coated ones whose light depends on where it goes, and metal and
-/// glass, which share nothing. Its lamp shines at the ceiling, so that nearly all light is reflected twice.
-fn room() -> Scene {
+/// glass, which share nothing; or with a mirror in place of a metal ball, seen through a lens. Its lamp shines at the ceiling, so that nearly all light is reflected twice.
+fn room(mirror: bool) -> Scene {
     let lamp = ShapeDesc {
         emission: emission(12.0),
         ..shape(
@@ -67,6 +69,9 @@ fn room() -> Scene {
     };
     let mut screen = wall(DVec3::new(-0.55, -0.6, -0.3), DVec3::new(1.0, 0.3, 0.6).normalize(), 2);
     screen.to_world *= DAffine3::from_scale(DVec3::splat(0.35));
+    let metal = coated(Rgb::new(0.9, 0.7, 0.4), 1.0, if mirror { 0.0 } else { 0.4 });
+    let camera = camera(DVec3::new(0.0, -0.1, 3.2), DVec3::new(0.0, -0.1, 0.0), 38.0);
+    let aperture_radius = if mirror { 0.05 } else { 0.0 };
     common::build(SceneDesc {
         shapes: vec![
             wall(DVec3::NEG_Y, DVec3::Y, 0),
@@ -85,7 +90,7 @@ fn room() -> Scene {
             Material::Lambert { reflectance: RgbParam::Const(Rgb::new(0.7, 0.2, 0.1)) },
             Material::TwoSided { front: MaterialId(0), back: MaterialId(1) },
             coated(Rgb::new(0.2, 0.6, 0.3), 0.0, 0.45),
-            coated(Rgb::new(0.9, 0.7, 0.4), 1.0, 0.4),
+            metal,
             Material::Dielectric {
                 eta: 1.5,
                 reflectance: RgbParam::Const(Rgb::ONE),
@@ -93,7 +98,7 @@ fn room() -> Scene {
                 roughness: None,
             },
         ],
-        camera: camera(DVec3::new(0.0, -0.1, 3.2), DVec3::new(0.0, -0.1, 0.0), 38.0),
+        camera: CameraDesc { aperture_radius, focus_distance: 3.0, ..camera },
         ..SceneDesc::default()
     })
 }
@@ -117,19 +122,17 @@ fn glow() -> Scene {
     })
 }
 
-fn renders(scene: &Scene, size: u32, share: bool, first: u64) -> Vec<MergedImage> {
+fn renders(scene: &Scene, options: &RenderOptions, first: u64) -> Vec<MergedImage> {
     let of = |seed| {
-        let counting = RenderOptions::counting(IntegratorKind::Path, 32);
-        let options = RenderOptions {
-            size: Some((size, size)),
-            max_depth: Some(6),
-            seed: Some(seed),
-            share: Some(share),
-            ..counting
-        };
+        let options = RenderOptions { max_depth: Some(6), seed: Some(seed), ..options.clone() };
         render_with(scene, &RenderSettings::resolve(&options, &scene.defaults).unwrap(), 2)
     };
     (first..first + RENDERS).map(of).collect()
+}
+
+/// `path` with square pictures.
+fn path(size: u32, share: bool) -> RenderOptions {
+    RenderOptions { size: Some((size, size)), share: Some(share), ..RenderOptions::counting(IntegratorKind::Path, 32) }
 }
 
 /// For each block and channel its means over the renders.
@@ -145,34 +148,61 @@ fn blocks(renders: &[MergedImage]) -> Vec<Mean> {
     all.map(|(x, y, channel)| renders.iter().map(|r| mean(r, x, y, channel)).collect()).collect()
 }
 
-/// Renders of which the blocks must have the same expectation: shared, and alone.
-fn compared(scene: &Scene, size: u32) -> [Vec<MergedImage>; 2] {
-    let (shared, alone) = (renders(scene, size, true, 0), renders(scene, size, false, 1000));
-    let (a, b) = (blocks(&shared), blocks(&alone));
+/// Renders with the options of both kinds, of which the blocks must have the same expectation.
+fn compared(scene: &Scene, options: [RenderOptions; 2]) -> [Vec<MergedImage>; 2] {
+    let [first, second] = &options;
+    let both = [renders(scene, first, 0), renders(scene, second, 1000)];
+    let (a, b) = (blocks(&both[0]), blocks(&both[1]));
     let significance = sidak(0.01, a.len());
     for (i, (a, b)) in a.iter().zip(&b).enumerate() {
         let p = welch_test(a, b);
         assert!(p > significance, "block {}, channel {}: {a:?} against {b:?} alone, p = {p}", i / 3, i % 3);
     }
-    [shared, alone]
+    both
+}
+
+/// How many times less the pixels of the first renders scatter; that they tell how much they do.
+fn gain([first, second]: &[Vec<MergedImage>; 2]) -> f64 {
+    let ((found, told), (found_alone, _)) = (deviations(first), deviations(second));
+    let difference: Mean = told.iter().zip(&found).map(|(t, f)| t - f).collect();
+    let (mean, error) = (difference.mean(), difference.error());
+    assert!(mean.abs() < 3.5 * error, "told variance less true variance: {mean} +- {error}");
+    found_alone.iter().sum::<f64>() / found.iter().sum::<f64>()
 }
 
 #[test]
 fn shared_paths_make_the_same_image_with_less_noise() {
-    let [shared, alone] = compared(&room(), 40);
-    let ((found, told), (found_alone, _)) = (deviations(&shared), deviations(&alone));
-    let total = |v: &[f64]| v.iter().sum::<f64>();
-    let gain = total(&found_alone) / total(&found);
+    let gain = gain(&compared(&room(false), [path(40, true), path(40, false)]));
     assert!(gain > 2.0, "variance is only {gain} times less");
-    let difference: Mean = told.iter().zip(&found).map(|(t, f)| t - f).collect();
-    let (mean, error) = (difference.mean(), difference.error());
-    assert!(mean.abs() < 3.5 * error, "told variance less true variance: {mean} +- {error}");
 }
 
 /// Light of coated surfaces depends on where it goes: what is shared is not what the path itself found.
 #[test]
 fn what_is_shared_goes_where_it_should() {
-    compared(&glow(), 16);
+    compared(&glow(), [path(16, true), path(16, false)]);
+}
+
+/// `mmlt` with square pictures, `n` mutations of which one counts for the pixels around.
+fn chains(size: u32, n: u32) -> RenderOptions {
+    RenderOptions {
+        size: Some((size, size)),
+        mmlt: Some(MmltOptions { neighbours: n, ..MmltOptions::default() }),
+        ..RenderOptions::counting(IntegratorKind::Mmlt, 24)
+    }
+}
+
+/// Seen through a lens, by mirrors and through glass, too.
+#[test]
+fn paths_of_chains_that_count_for_neighbours_make_the_same_image_with_less_noise() {
+    let scene = room(true);
+    compared(&scene, [chains(40, 4), path(40, false)]);
+    let gain = gain(&compared(&scene, [chains(40, 4), chains(40, 0)]));
+    assert!(gain > 1.5, "variance is only {gain} times less");
+}
+
+#[test]
+fn paths_of_chains_go_where_they_should() {
+    compared(&glow(), [chains(16, 2), path(16, false)]);
 }
 
 #[test]

@@ -1,9 +1,12 @@
 use super::bootstrap::sample_key;
 use super::constants::{ChainConstants, MmltOptions};
 use super::evaluate::{Evaluator, Proposal};
+use super::neighbours::{Neighbours, Period, Tail};
 use crate::film::{Counters, SplatSums};
 use crate::integrator::UnitContext;
+use crate::math::Vec2;
 use crate::sampling::{IndependentSampler, PrimarySpace, Sampler, hash_words};
+use crate::spectrum::Rgb;
 use serde::{Deserialize, Serialize};
 
 /// Names the mutations of chains among all hashes.
@@ -92,6 +95,11 @@ pub fn run_chains(
 ) -> Result<Option<ChainStats>, Mismatch> {
     let mut stats = ChainStats::default();
     let Some(mut evaluator) = Evaluator::new(c, constants, options, task.edges) else { return Ok(Some(stats)) };
+    // A vertex in a medium is not joined to others' camera rays.
+    let period = Period::new(options.neighbours, task.mutations).filter(|_| !c.scene.features.has_media());
+    let neighbours = Neighbours::new(c, constants);
+    let mut chain =
+        Chain { c, options, b: task.b, period, neighbours, splats, place: None, waiting: Waiting::default() };
     for (i, start) in (task.first..).zip(task.starts) {
         // Replay the start.
         let mut space = PrimarySpace::new(task.edges as usize);
@@ -101,9 +109,9 @@ pub fn run_chains(
             return Err(Mismatch { edges: task.edges, index: start.0, expected: start.2, found: current.target });
         }
         space.accept();
+        chain.start(current, &evaluator);
         let key =
             hash_words(&[c.seed, CHAIN, u64::from(pass), u64::from(c.replicate), u64::from(task.edges), u64::from(i)]);
-        let mut chain = Chain { c, options, b: task.b, current, waiting: 0.0, splats };
         for mutation in 0..task.mutations {
             if mutation % 256 == 0 && (c.stopped)() {
                 return Ok(None);
@@ -116,8 +124,9 @@ pub fn run_chains(
             } else {
                 space.propose_small(numbers.next_bits());
             }
+            let together = period.filter(|p| p.has(mutation)).map(|_| numbers.next_bits());
             let proposal = evaluator.evaluate(&mut space);
-            let accepted = chain.step(&proposal, large, u);
+            let accepted = chain.step(proposal, &evaluator, &Step { large, u, together });
             if accepted {
                 space.accept();
             }
@@ -127,7 +136,32 @@ pub fn run_chains(
     }
     counters.samples += task.starts.len() as u64 * u64::from(task.mutations);
     counters.add(&evaluator.tracer.counters);
+    counters.rays += chain.neighbours.rays;
     Ok(Some(stats))
+}
+
+/// How a mutation is decided, and how it counts.
+struct Step {
+    large: bool,
+    u: f32,
+    /// Where the lattices lie, if it counts for the neighbours too.
+    together: Option<u64>,
+}
+
+/// A path, and what it has in common with its neighbours.
+#[derive(Clone, Copy)]
+struct Place {
+    path: Proposal,
+    tail: Option<Tail>,
+}
+
+/// Weight of the current path that is not splatted yet.
+#[derive(Clone, Copy, Default)]
+struct Waiting {
+    alone: f64,
+    together: f64,
+    /// Where the lattices lie.
+    grid: u64,
 }
 
 /// A chain's place, and the splat that grows while it stays there.
@@ -135,50 +169,85 @@ struct Chain<'a, 'b> {
     c: &'a UnitContext<'a>,
     options: &'a MmltOptions,
     b: f32,
-    current: Proposal,
-    /// Weight of the current path that is not splatted yet.
-    waiting: f64,
+    period: Option<Period>,
+    neighbours: Neighbours<'a>,
     splats: &'b mut SplatSums,
+    place: Option<Place>,
+    waiting: Waiting,
 }
 
 impl Chain<'_, '_> {
+    /// The chain begins at the path that `evaluator` made last.
+    fn start(&mut self, path: Proposal, evaluator: &Evaluator<'_>) {
+        self.place = Some(self.place_of(path, evaluator));
+    }
+
+    fn place_of(&self, path: Proposal, evaluator: &Evaluator<'_>) -> Place {
+        Place { path, tail: self.period.and_then(|_| evaluator.tail(&path)) }
+    }
+
     /// One mutation: both paths are splatted with their expected share of it. Whether the chain moves.
-    fn step(&mut self, proposal: &Proposal, large: bool, u: f32) -> bool {
-        let accept = if proposal.target > 0.0 { (proposal.target / self.current.target).min(1.0) } else { 0.0 };
-        self.waiting += f64::from(1.0 - accept) * self.weight(self.current.target);
+    fn step(&mut self, proposal: Proposal, evaluator: &Evaluator<'_>, step: &Step) -> bool {
+        let Some(current) = self.place else { return false };
+        let accept = if proposal.target > 0.0 { (proposal.target / current.path.target).min(1.0) } else { 0.0 };
+        self.wait(&current, f64::from(1.0 - accept), step);
         if !(proposal.target > 0.0) {
             return false;
         }
-        let bonus = if large && self.options.kelemen { 1.0 } else { 0.0 };
-        let weight = f64::from(accept + bonus) * self.weight(proposal.target);
-        if u < accept {
+        let proposed = self.place_of(proposal, evaluator);
+        let bonus = if step.large && self.options.kelemen { 1.0 } else { 0.0 };
+        let share = f64::from(accept + bonus);
+        if step.u < accept {
             self.leave();
-            self.current = *proposal;
-            self.waiting = weight;
+            self.place = Some(proposed);
+            self.wait(&proposed, share, step);
             return true;
         }
-        splat(self.c, self.splats, proposal, weight);
+        let kept = std::mem::take(&mut self.waiting);
+        self.wait(&proposed, share, step);
+        self.splat(&proposed);
+        self.waiting = kept;
         false
     }
 
-    /// What a unit of probability at a path is worth: `1 / (c + p_L b)`, or `1 / c` without weights for large steps.
-    fn weight(&self, target: f32) -> f64 {
+    /// Adds `share` of a mutation to what waits for a place. A unit of probability is worth `1 / (c + p_L b)` there, or `1 / c` without
+    /// weights for large steps.
+    fn wait(&mut self, place: &Place, share: f64, step: &Step) {
         let independent = if self.options.kelemen { self.options.large_step * self.b } else { 0.0 };
-        1.0 / f64::from(target + independent)
+        let weight = share / f64::from(place.path.target + independent);
+        match (place.tail.and(self.period), step.together) {
+            (None, _) => self.waiting.alone += weight,
+            (Some(period), None) => self.waiting.alone += weight * period.weight(false),
+            (Some(period), Some(grid)) => {
+                self.waiting.together += weight * period.weight(true);
+                self.waiting.grid = grid;
+            }
+        }
     }
 
     /// Splats what has gathered at the current path.
     fn leave(&mut self) {
-        splat(self.c, self.splats, &self.current, self.waiting);
-        self.waiting = 0.0;
+        if let Some(place) = self.place {
+            self.splat(&place);
+        }
+    }
+
+    /// Splats what waits, at `place`.
+    fn splat(&mut self, place: &Place) {
+        let waiting = std::mem::take(&mut self.waiting);
+        splat(self.c, self.splats, place.path.value, place.path.raster, waiting.alone);
+        if let (Some(tail), true) = (&place.tail, waiting.together > 0.0) {
+            self.neighbours.splat(&place.path, tail, waiting.together, waiting.grid, self.splats);
+        }
     }
 }
 
-fn splat(c: &UnitContext<'_>, splats: &mut SplatSums, path: &Proposal, weight: f64) {
+/// Splats `weight` times a contribution.
+pub(super) fn splat(c: &UnitContext<'_>, splats: &mut SplatSums, value: Rgb, raster: Vec2, weight: f64) {
     if weight == 0.0 {
         return;
     }
     // In f64: one over a target near the end of f32's range is beyond it, their product is not.
-    let value = path.value.map(|v| (f64::from(v) * weight) as f32);
-    splats.splat(&c.view.filter, path.raster, value);
+    let value = value.map(|v| (f64::from(v) * weight) as f32);
+    splats.splat(&c.view.filter, raster, value);
 }

@@ -35,23 +35,26 @@ pub struct MmltOptions {
     pub direct_edges: u32,
     /// Edges of the longest path that chains carry; ordinary samples carry the rest.
     pub longest: u32,
+    /// Of so many mutations one counts for the pixels around, too; 0 = none.
+    pub neighbours: u32,
 }
 
 impl Default for MmltOptions {
     fn default() -> Self {
         Self {
-            large_step: 0.1,
-            step_min: 1.0 / 1024.0,
-            step_max: 1.0 / 64.0,
+            large_step: 0.3,
+            step_min: 1.0 / 512.0,
+            step_max: 1.0 / 32.0,
             gaussian: 0.0,
             kelemen: true,
             lift: 0.5,
             learn: true,
             chain_length: 1 << 16,
-            direct_share: 0.2,
+            direct_share: 0.4,
             pool_share: 0.1,
             direct_edges: 2,
             longest: 64,
+            neighbours: 32,
         }
     }
 }
@@ -72,6 +75,7 @@ impl MmltOptions {
         pool_share: 0.1,
         direct_edges: 0,
         longest: 64,
+        neighbours: 0,
     };
 
     /// The same with the steps of Pharr, Jakob and Humphreys (2016, section 16.4).

@@ -1,6 +1,7 @@
 use super::constants::{ChainConstants, MmltOptions};
+use super::neighbours::Tail;
 use crate::integrator::UnitContext;
-use crate::math::Vec2;
+use crate::math::{Vec2, Vec3};
 use crate::path::{Always, Connection, Subpath, Tracer};
 use crate::sampling::{Discrete, PrimarySpace, Sampler, StepSizes, Stream};
 use crate::spectrum::Rgb;
@@ -24,11 +25,14 @@ pub struct Evaluator<'a> {
     pub tracer: Tracer<'a>,
     constants: &'a ChainConstants,
     size: Vec2,
-    edges: usize,
+    pub(super) edges: usize,
     techniques: Discrete,
     sizes: StepSizes,
-    camera: Subpath,
-    light: Subpath,
+    pub(super) camera: Subpath,
+    pub(super) light: Subpath,
+    /// Of the path that was made last: where it goes through the lens, and the direction of its connection.
+    lens_u: Vec2,
+    connection: Option<Vec3>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -44,6 +48,8 @@ impl<'a> Evaluator<'a> {
             sizes: options.step_sizes(),
             camera: Subpath::default(),
             light: Subpath::default(),
+            lens_u: Vec2::ZERO,
+            connection: None,
         })
     }
 
@@ -73,12 +79,22 @@ impl<'a> Evaluator<'a> {
         proposal
     }
 
+    /// What the path that was made last has in common with its neighbours, if it makes a set with them.
+    pub(super) fn tail(&self, path: &Proposal) -> Option<Tail> {
+        if !(path.target > 0.0) {
+            return None;
+        }
+        let ray = self.tracer.camera.generate_ray(path.raster, self.lens_u);
+        Tail::of(self, path, self.lens_u, &ray, self.connection)
+    }
+
     /// Weighted contribution to the whole picture of the path with s vertices from the light, and where it falls.
     fn path(&mut self, space: &mut PrimarySpace, s: usize) -> Option<(Rgb, Vec2)> {
         let t = self.edges + 1 - s;
         let mut lens = space.stream(Stream::Lens, &self.sizes);
         let raster = lens.next_2d() * self.size;
         let lens_u = self.tracer.lens_numbers(&mut lens);
+        (self.lens_u, self.connection) = (lens_u, None);
         if t == 1 {
             self.walk_light(space, s)?;
             let path = self.tracer.to_lens(&self.light, s, lens_u)?;
@@ -116,6 +132,7 @@ impl<'a> Evaluator<'a> {
 
     fn visible(&mut self, path: &Connection) -> Option<Rgb> {
         let value = path.weighted();
+        self.connection = path.shadow.map(|ray| ray.d.normalize());
         (!value.is_black() && self.tracer.is_free(path)).then_some(value)
     }
 }

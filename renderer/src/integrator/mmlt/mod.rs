@@ -22,6 +22,7 @@ mod bootstrap;
 mod chain;
 mod constants;
 mod evaluate;
+mod neighbours;
 
 pub use bootstrap::{BootstrapSums, Found, PoolTask, run_bootstrap};
 pub use chain::{ChainStart, ChainStats, ChainTask, Mismatch, run_chains};

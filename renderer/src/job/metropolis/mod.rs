@@ -176,7 +176,7 @@ impl Share {
         // The film knows how many it has: at least one of every pass, and the pilot's.
         let start = film.pixel(0).1 as u32;
         let done = dealt(settings, self.done, replicate) * settings.replicates;
-        let end = ((f64::from(done + self.density) * share).ceil() as u32).max(2);
+        let end = ((f64::from(done + self.density) * share).ceil() as u32).max(1);
         GroupRange { replicate, start, end: end.max(start + 1), closes: self.closes }
     }
 }
