@@ -4,6 +4,7 @@ use crate::film::{Rect, TileGrid};
 use crate::integrator::mmlt::{ChainConstants, ChainStart};
 use crate::scene::bundle::Digest;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Samples (or light paths) that one unit aims at: some tens of milliseconds of work.
 const UNIT_SAMPLES: u64 = 1 << 16;
@@ -295,16 +296,23 @@ impl PassPlan {
         }
     }
 
+    /// The parts, and where the units of each begin and end.
+    fn ranges(&self) -> impl Iterator<Item = (&Part, Range<u64>)> {
+        self.parts.iter().scan(0, |end, part| {
+            let start = *end;
+            *end += self.units_of(part);
+            Some((part, start..*end))
+        })
+    }
+
+    /// The part whose first unit is `id`.
+    pub fn begins_part(&self, id: u32) -> Option<&Part> {
+        self.ranges().find(|(_, range)| !range.is_empty() && range.start == u64::from(id)).map(|(part, _)| part)
+    }
+
     /// The part whose last unit is `id`.
     pub fn ends_part(&self, id: u32) -> Option<&Part> {
-        let mut end = 0;
-        for part in &self.parts {
-            end += self.units_of(part);
-            if u64::from(id) + 1 == end {
-                return Some(part);
-            }
-        }
-        None
+        self.ranges().find(|(_, range)| !range.is_empty() && range.end == u64::from(id) + 1).map(|(part, _)| part)
     }
 
     /// Whether unit `id` is the last one of ordinary samples of a group: every pixel has samples then.

@@ -122,6 +122,7 @@ impl Rendering {
         if unit != self.next {
             return Err(FoldError::Order { got: unit, want: self.next, count: self.plan.unit_count() });
         }
+        self.forget_pilot(unit);
         self.fold_any(unit, result)?;
         self.next += 1;
         if let Some(&Part::Samples(part)) = self.plan.ends_part(unit) {
@@ -139,6 +140,14 @@ impl Rendering {
             }
         }
         Ok(())
+    }
+
+    /// The pilot's ordinary samples give way to those of the first chains' pass: they decide on how many these are.
+    fn forget_pilot(&mut self, unit: u32) {
+        let first = self.plan.chain_weight > 0 && self.done_spp == 0;
+        if first && matches!(self.plan.begins_part(unit), Some(Part::Samples(part)) if part.replicate == 0) {
+            self.groups[0] = GroupFilm::Empty;
+        }
     }
 
     /// Folds a later unit of the pass although earlier ones are missing: only to save what an interrupted job has finished.

@@ -27,7 +27,7 @@ pub struct MmltOptions {
     pub learn: bool,
     /// Mutations of one chain.
     pub chain_length: u32,
-    /// Ordinary samples of emission and direct light, for each mutation.
+    /// Ordinary samples of emission and direct light, for each mutation; 0 = as many as the pilot finds them to be worth.
     pub direct_share: f32,
     /// Share of the work that goes into pools.
     pub pool_share: f32,
@@ -50,7 +50,7 @@ impl Default for MmltOptions {
             lift: 0.5,
             learn: true,
             chain_length: 1 << 16,
-            direct_share: 0.4,
+            direct_share: 0.0,
             pool_share: 0.1,
             direct_edges: 2,
             longest: 64,
@@ -105,7 +105,7 @@ impl MmltOptions {
         if !(0.0..=1.0).contains(&self.lift) {
             return fail("lift must lie between 0 and 1");
         }
-        if !(self.direct_share > 0.0 && self.direct_share <= 100.0) {
+        if !(self.direct_share >= 0.0 && self.direct_share <= 100.0) {
             return fail("direct_share must lie between 0 and 100");
         }
         if !(self.pool_share > 0.0 && self.pool_share <= 0.9) {
@@ -170,6 +170,8 @@ pub struct ChainConstants {
     pub target: Vec<f32>,
     /// Samples of pools leave it to chance whether paths whose share of the target is below this are tested for visibility.
     pub threshold: f32,
+    /// Ordinary samples of what chains don't carry, for each mutation.
+    pub direct_share: f32,
 }
 
 impl ChainConstants {

@@ -10,6 +10,8 @@
 //! * what a large step finds is combined with the chain by the balance heuristic (Kelemen et al. 2002, section 3.4), so that what the
 //!   chain seldom visits is as good as ordinary samples make it;
 //! * a sample of the pool that chains start from is a whole bidirectional one: all techniques, all lengths;
+//! * how many ordinary samples of short paths go with the mutations follows from how bright both are in the pilot;
+//! * the path at hand counts, now and then, for the pixels around its own (`neighbours.rs`), which pays most of all of these;
 //! * there are many chains, their starts drawn by systematic resampling from a pool of independent samples, which makes them free
 //!   of start-up bias (Veach 1997, section 11.3.1).
 //!

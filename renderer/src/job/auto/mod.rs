@@ -270,17 +270,23 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
     if let [_, _, _, _, samples, mmlt] = trials {
         let s = mmlt.settings();
         let splats = Sample::new(mmlt, Part::Splats);
-        let direct = f64::from(s.mmlt.direct_share);
         let of_mutations = splats.relative_variance(&weights, true) * of_group(mmlt);
-        let of_samples =
-            Sample::new(samples, Part::Whole).relative_variance(&weights, false) * of_group(samples) / direct;
+        let of_samples = Sample::new(samples, Part::Whole).relative_variance(&weights, false) * of_group(samples);
         let whole = Sample::new(mmlt, Part::Whole);
         let unseen = whole.unseen(&bdpt_sample, f64::from(mmlt.done_spp()));
         let spent = mmlt.spent();
         let work = metropolis::chain_share(s) * each(&spent.chains, IntegratorKind::Mmlt)
-            + metropolis::pools_per_mutation(s) * each(&spent.pools, IntegratorKind::Mmlt)
-            + direct * each(&spent.samples, IntegratorKind::Path);
-        let variance = of_mutations + of_samples + unseen;
+            + metropolis::pools_per_mutation(s) * each(&spent.pools, IntegratorKind::Mmlt);
+        let of_sample = each(&spent.samples, IntegratorKind::Path);
+        // As many ordinary samples as pay best, which the render's pilot comes near.
+        let best = (of_samples * work / (of_mutations * of_sample)).sqrt();
+        let direct = match f64::from(s.mmlt.direct_share) {
+            0.0 if best.is_nan() => metropolis::MOST_SHARE,
+            0.0 => best.clamp(metropolis::LEAST_SHARE, metropolis::MOST_SHARE),
+            told => told,
+        };
+        let work = work + direct * of_sample;
+        let variance = of_mutations + of_samples / direct + unseen;
         outcomes.push(Outcome { integrator: IntegratorKind::Mmlt, variance, unseen, work: work / unit });
     }
     outcomes

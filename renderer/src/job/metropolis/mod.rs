@@ -1,7 +1,8 @@
 //! The plans of a Metropolis job, and what it has learned so far.
 //!
 //! * Pass 0 is the *pilot*: independent samples of every path length. It teaches which lights to select, the probabilities of the
-//!   techniques and the target map, and is a preview; its samples count for nothing else, so nothing that it steers is biased by it.
+//!   techniques, the target map and how many ordinary samples pay, and is a preview; its samples count for nothing else, so nothing that it
+//!   steers is biased by it.
 //! * Pass 1 makes *pools*: independent samples again, now of the target that the chains will have. A pool's mean is `b`.
 //! * Later passes run *chains* from starts drawn from the pools, and the ordinary samples of emission and direct light; where time or
 //!   error is the budget, they also make the pools of the pass after. What a pass does for a group is a complete estimate of its own,
@@ -22,6 +23,7 @@ use crate::job::settings::RenderSettings;
 use crate::job::unit::{Unit, UnitKind, UnitResult};
 use crate::light::selection_weights;
 use crate::sampling::{IndependentSampler, Sampler};
+pub(in crate::job) use learn::{LEAST_SHARE, MOST_SHARE};
 use pool::Pool;
 use std::collections::BTreeMap;
 
@@ -79,7 +81,8 @@ pub fn pilot(settings: &RenderSettings) -> PassPlan {
     }
     let depths = lengths.iter().map(|k| Depth { edges: *k, techniques: vec![1.0; *k as usize + 1] }).collect();
     let columns = settings.width.div_ceil(TARGET_CELL);
-    let chains = ChainConstants { depths, columns, target: Vec::new(), threshold: 0.0 };
+    let direct_share = Some(settings.mmlt.direct_share).filter(|s| *s > 0.0).unwrap_or(learn::KNOWN_SHARE);
+    let chains = ChainConstants { depths, columns, target: Vec::new(), threshold: 0.0, direct_share };
     plan(settings, 0, parts, chains, 0, false)
 }
 
@@ -171,13 +174,14 @@ impl Share {
     }
 
     /// The ordinary samples of a group that go with its mutations.
-    fn direct(&self, settings: &RenderSettings, replicate: u32, film: &GroupFilm) -> GroupRange {
-        let share = f64::from(settings.mmlt.direct_share) / f64::from(settings.replicates);
-        // The film knows how many it has: at least one of every pass, and the pilot's.
-        let start = film.pixel(0).1 as u32;
+    fn direct(&self, settings: &RenderSettings, share: f32, replicate: u32, film: &GroupFilm) -> GroupRange {
+        let share = f64::from(share) / f64::from(settings.replicates);
+        // The film knows how many it has, at least one of every pass. Those of the pilot, the first group's, are no longer among them.
+        let pilot = u32::from(replicate == 0);
+        let start = if self.done == 0 { 0 } else { film.pixel(0).1 as u32 };
         let done = dealt(settings, self.done, replicate) * settings.replicates;
-        let end = ((f64::from(done + self.density) * share).ceil() as u32).max(1);
-        GroupRange { replicate, start, end: end.max(start + 1), closes: self.closes }
+        let end = ((f64::from(done + self.density) * share).ceil() as u32).max(start + 1);
+        GroupRange { replicate, start: start + pilot, end: end + pilot, closes: self.closes }
     }
 }
 
@@ -254,7 +258,7 @@ impl Metropolis {
         for ((_, edges), pool) in &self.pools {
             *self.contributions.entry(*edges).or_default() += pool.b();
         }
-        let mut parts = self.chains_of(settings, pass, &share, groups);
+        let mut parts = self.chains_of(settings, pass, &share, &chains, groups);
         self.pools.clear();
         let next = Share::after(settings, done + share.size);
         if let Some(next) = next.as_ref().filter(|_| !empty) {
@@ -274,7 +278,14 @@ impl Metropolis {
     }
 
     /// The chains of a pass and its ordinary samples, group after group.
-    fn chains_of(&self, settings: &RenderSettings, pass: u32, of_pass: &Share, films: &[GroupFilm]) -> Vec<Part> {
+    fn chains_of(
+        &self,
+        settings: &RenderSettings,
+        pass: u32,
+        of_pass: &Share,
+        constants: &ChainConstants,
+        films: &[GroupFilm],
+    ) -> Vec<Part> {
         let groups = f64::from(settings.replicates);
         let budget = f64::from(of_pass.density) * pixels(settings) * chain_share(settings) / groups;
         let lengths: Vec<u32> = lengths(settings).collect();
@@ -300,7 +311,8 @@ impl Metropolis {
                 let starts = pool.starts(chains, u);
                 parts.push(Part::Chains { replicate, edges: *edges, b, starts, mutations: length });
             }
-            parts.push(Part::Samples(of_pass.direct(settings, replicate, &films[replicate as usize])));
+            let direct = constants.direct_share;
+            parts.push(Part::Samples(of_pass.direct(settings, direct, replicate, &films[replicate as usize])));
         }
         parts
     }

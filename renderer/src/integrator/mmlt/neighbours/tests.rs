@@ -36,7 +36,7 @@ fn each_tail(name: &str, mut see: impl FnMut(&Evaluator<'_>, &Proposal, &Tail, &
         stopped: &|| false,
     };
     let depths = (3..=6u32).map(|edges| Depth { edges, techniques: vec![1.0; edges as usize + 1] }).collect();
-    let constants = ChainConstants { depths, columns: 6, target: Vec::new(), threshold: 0.0 };
+    let constants = ChainConstants { depths, columns: 6, target: Vec::new(), threshold: 0.0, direct_share: 1.0 };
     let mut neighbours = Neighbours::new(&c, &constants);
     for edges in 3..=6 {
         let mut evaluator = Evaluator::new(&c, &constants, &MmltOptions::default(), edges).unwrap();
