@@ -54,7 +54,8 @@ fn ball(p: DVec3, radius: f64, material: u32) -> ShapeDesc {
 }
 
 /// A room of all kinds of surfaces: diffuse ones, seen from both sides, coated ones whose light depends on where it goes, and metal and
-/// glass, which share nothing; or with a mirror in place of a metal ball, seen through a lens. Its lamp shines at the ceiling, so that nearly all light is reflected twice.
+/// glass, which share nothing; or with a mirror in place of a metal ball, seen through a lens. Its lamp shines at the ceiling, so that
+/// nearly all light is reflected twice.
 fn room(mirror: bool) -> Scene {
     let lamp = ShapeDesc {
         emission: emission(12.0),

@@ -50,6 +50,23 @@ impl Carried {
 }
 
 impl<'a> UnitContext<'a> {
+    /// For all paths of up to `max_depth` edges, without what makes rendering faster: roulette, connections left to chance, shared paths.
+    pub fn of_all_paths(scene: &'a Scene, view: &'a View, max_depth: u32) -> Self {
+        Self {
+            scene,
+            view,
+            seed: 0,
+            replicate: 0,
+            max_depth,
+            carried: Carried::ALL,
+            rr_depth: u32::MAX,
+            threshold: 0.0,
+            share: false,
+            selector: &scene.selector,
+            stopped: &|| false,
+        }
+    }
+
     /// Traces and connects walks for the unit; Russian roulette may end them from `rr_depth` edges on, if at all.
     pub fn tracer(&self, rr_depth: Option<u32>) -> Tracer<'a> {
         self.tracer_weighing(rr_depth, Heuristic::Power)

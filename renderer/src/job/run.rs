@@ -170,19 +170,9 @@ pub fn render_strategies(
     let view = View::new(scene, settings.width, settings.height, settings.filter)?;
     let view = &view;
     let sample = move |index| {
-        let context = UnitContext {
-            scene,
-            view,
-            seed: settings.seed,
-            replicate: 0,
-            max_depth: settings.max_depth.unwrap_or(strategies::MAX_EDGES),
-            carried: Carried::ALL,
-            rr_depth: u32::MAX,
-            threshold: 0.0,
-            share: false,
-            selector: &scene.selector,
-            stopped: &|| stop.stopped(),
-        };
+        let max_depth = settings.max_depth.unwrap_or(strategies::MAX_EDGES);
+        let all = UnitContext::of_all_paths(scene, view, max_depth);
+        let context = UnitContext { seed: settings.seed, stopped: &|| stop.stopped(), ..all };
         Strategies::render(&context, index..index + 1)
     };
     let mut sum: Option<Strategies> = None;

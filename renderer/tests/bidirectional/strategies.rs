@@ -1,7 +1,7 @@
 use crate::common::t999;
 use crate::scenes;
 use renderer::integrator::bdpt::{Bidirectional, Sink};
-use renderer::integrator::{Carried, UnitContext, View};
+use renderer::integrator::{UnitContext, View};
 use renderer::path::Connection;
 use renderer::path::mis::Heuristic;
 use renderer::sampling::{IndependentSampler, Sampler};
@@ -46,19 +46,7 @@ fn estimate(values: &[f64]) -> (f64, f64) {
 fn strategies_without_weights_agree_with_each_other_and_with_their_weighted_sum() {
     let scene = scenes::diffuse();
     let view = View::new(&scene, SIDE, SIDE, FilterDesc::Box { radius: 0.5 }).unwrap();
-    let context = UnitContext {
-        scene: &scene,
-        view: &view,
-        seed: 0,
-        replicate: 0,
-        max_depth: 5,
-        carried: Carried::ALL,
-        rr_depth: u32::MAX,
-        threshold: 0.0,
-        share: false,
-        selector: &scene.selector,
-        stopped: &|| false,
-    };
+    let context = UnitContext::of_all_paths(&scene, &view, 5);
     let groups: Vec<Sums> = (0..u64::from(GROUPS))
         .map(|group| {
             let mut sums = Sums::default();

@@ -97,9 +97,7 @@ pub fn run_chains(
     let Some(mut evaluator) = Evaluator::new(c, constants, options, task.edges) else { return Ok(Some(stats)) };
     // A vertex in a medium is not joined to others' camera rays.
     let period = Period::new(options.neighbours, task.mutations).filter(|_| !c.scene.features.has_media());
-    let neighbours = Neighbours::new(c, constants);
-    let mut chain =
-        Chain { c, options, b: task.b, period, neighbours, splats, place: None, waiting: Waiting::default() };
+    let mut neighbours = Neighbours::new(c, constants);
     for (i, start) in (task.first..).zip(task.starts) {
         // Replay the start.
         let mut space = PrimarySpace::new(task.edges as usize);
@@ -109,7 +107,9 @@ pub fn run_chains(
             return Err(Mismatch { edges: task.edges, index: start.0, expected: start.2, found: current.target });
         }
         space.accept();
-        chain.start(current, &evaluator);
+        let place = Place::new(current, &evaluator, period);
+        let neighbours = &mut neighbours;
+        let mut chain = Chain { c, options, b: task.b, period, neighbours, splats, place, waiting: Waiting::default() };
         let key =
             hash_words(&[c.seed, CHAIN, u64::from(pass), u64::from(c.replicate), u64::from(task.edges), u64::from(i)]);
         for mutation in 0..task.mutations {
@@ -136,7 +136,7 @@ pub fn run_chains(
     }
     counters.samples += task.starts.len() as u64 * u64::from(task.mutations);
     counters.add(&evaluator.tracer.counters);
-    counters.rays += chain.neighbours.rays;
+    counters.rays += neighbours.rays;
     Ok(Some(stats))
 }
 
@@ -155,6 +155,13 @@ struct Place {
     tail: Option<Tail>,
 }
 
+impl Place {
+    /// The path that `evaluator` made last.
+    fn new(path: Proposal, evaluator: &Evaluator<'_>, period: Option<Period>) -> Self {
+        Self { path, tail: period.and_then(|_| evaluator.tail(&path)) }
+    }
+}
+
 /// Weight of the current path that is not splatted yet.
 #[derive(Clone, Copy, Default)]
 struct Waiting {
@@ -170,36 +177,27 @@ struct Chain<'a, 'b> {
     options: &'a MmltOptions,
     b: f32,
     period: Option<Period>,
-    neighbours: Neighbours<'a>,
+    neighbours: &'b mut Neighbours<'a>,
     splats: &'b mut SplatSums,
-    place: Option<Place>,
+    place: Place,
     waiting: Waiting,
 }
 
 impl Chain<'_, '_> {
-    /// The chain begins at the path that `evaluator` made last.
-    fn start(&mut self, path: Proposal, evaluator: &Evaluator<'_>) {
-        self.place = Some(self.place_of(path, evaluator));
-    }
-
-    fn place_of(&self, path: Proposal, evaluator: &Evaluator<'_>) -> Place {
-        Place { path, tail: self.period.and_then(|_| evaluator.tail(&path)) }
-    }
-
     /// One mutation: both paths are splatted with their expected share of it. Whether the chain moves.
     fn step(&mut self, proposal: Proposal, evaluator: &Evaluator<'_>, step: &Step) -> bool {
-        let Some(current) = self.place else { return false };
+        let current = self.place;
         let accept = if proposal.target > 0.0 { (proposal.target / current.path.target).min(1.0) } else { 0.0 };
         self.wait(&current, f64::from(1.0 - accept), step);
         if !(proposal.target > 0.0) {
             return false;
         }
-        let proposed = self.place_of(proposal, evaluator);
+        let proposed = Place::new(proposal, evaluator, self.period);
         let bonus = if step.large && self.options.kelemen { 1.0 } else { 0.0 };
         let share = f64::from(accept + bonus);
         if step.u < accept {
             self.leave();
-            self.place = Some(proposed);
+            self.place = proposed;
             self.wait(&proposed, share, step);
             return true;
         }
@@ -227,9 +225,8 @@ impl Chain<'_, '_> {
 
     /// Splats what has gathered at the current path.
     fn leave(&mut self) {
-        if let Some(place) = self.place {
-            self.splat(&place);
-        }
+        let place = self.place;
+        self.splat(&place);
     }
 
     /// Splats what waits, at `place`.

@@ -30,7 +30,7 @@ pub struct Evaluator<'a> {
     sizes: StepSizes,
     pub(super) camera: Subpath,
     pub(super) light: Subpath,
-    /// Of the path that was made last: where it goes through the lens, and the direction of its connection.
+    /// Of the path that was made last: where it goes through the lens, and along what its two walks were joined.
     lens_u: Vec2,
     connection: Option<Vec3>,
 }
@@ -132,7 +132,7 @@ impl<'a> Evaluator<'a> {
 
     fn visible(&mut self, path: &Connection) -> Option<Rgb> {
         let value = path.weighted();
-        self.connection = path.shadow.map(|ray| ray.d.normalize());
+        self.connection = path.shadow.map(|ray| ray.d);
         (!value.is_black() && self.tracer.is_free(path)).then_some(value)
     }
 }

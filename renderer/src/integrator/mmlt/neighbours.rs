@@ -121,7 +121,7 @@ impl Tail {
             left => {
                 let common = camera.get(passed + 2)?;
                 let onward = match camera.get(passed + 3) {
-                    _ if left == 3 => connection?,
+                    _ if left == 3 => connection?.normalize(),
                     Some(next) => (next.anchor.p - common.anchor.p).normalize(),
                     None => e.camera.escape?.w,
                 };

@@ -31,11 +31,12 @@ impl Metropolis {
             Depth { edges, techniques: (0..n).map(|s| if learned { share(s) } else { 1.0 }).collect() }
         });
         let depths = depths.collect();
+        let cells = self.cells(settings, direct);
         let direct_share = match settings.mmlt.direct_share {
-            0.0 => self.direct_share(settings, &direct),
+            0.0 => direct_share(&cells),
             share => share,
         };
-        let (columns, target) = self.target_map(settings, direct);
+        let (columns, target) = self.target_map(settings, &cells);
         let b: f64 = self.techniques.values().flatten().sum();
         // The target map's factors are about one for what the picture consists of.
         ChainConstants { depths, columns, target, threshold: (THRESHOLD_SHARE * b) as f32, direct_share }
@@ -58,26 +59,14 @@ impl Metropolis {
         cells.into_iter().map(|(sums, count)| sums.map(|sum| if count > 0.0 { sum / count } else { 0.0 })).collect()
     }
 
-    /// Ordinary samples for each mutation: as the noise of both is relative to what they carry, the best ratio is that of their roots of
-    /// mean squares, each relative to the brightness of its place.
-    fn direct_share(&self, settings: &RenderSettings, direct: impl Fn(usize) -> [f64; 3]) -> f32 {
-        let (chains, samples) = self.cells(settings, direct).iter().fold((0.0, 0.0), |(c, s), [chains, samples]| {
-            let whole = chains + samples;
-            let unit = if whole > 0.0 { 1.0 / whole } else { 0.0 };
-            (c + (chains * unit) * (chains * unit), s + (samples * unit) * (samples * unit))
-        });
-        let ratio = if chains > 0.0 { (samples / chains).sqrt() } else { MOST_SHARE };
-        (SHARE_IF_EQUAL * ratio).clamp(LEAST_SHARE, MOST_SHARE) as f32
-    }
-
     /// `(I^2 + 0.01)^(-lift / 2)` by cell, I being the mean of what the pilot saw in and around the cell.
-    fn target_map(&self, settings: &RenderSettings, direct: impl Fn(usize) -> [f64; 3]) -> (u32, Vec<f32>) {
+    fn target_map(&self, settings: &RenderSettings, cells: &[[f64; 2]]) -> (u32, Vec<f32>) {
         let (width, height) = (settings.width, settings.height);
         let (columns, rows) = (width.div_ceil(TARGET_CELL), height.div_ceil(TARGET_CELL));
         if settings.mmlt.lift == 0.0 || self.pilot.is_empty() {
             return (columns, Vec::new());
         }
-        let cells: Vec<f64> = self.cells(settings, direct).iter().map(|[chains, samples]| chains + samples).collect();
+        let cells: Vec<f64> = cells.iter().map(|[chains, samples]| chains + samples).collect();
         // Relative to a picture of no ordinary brightness: factors must be about one whatever the unit of light.
         let mean = cells.iter().sum::<f64>() / cells.len() as f64;
         let unit = if mean > 0.0 { mean / mean.clamp(1e-3, 10.0) } else { 1.0 };
@@ -97,4 +86,16 @@ impl Metropolis {
         let target = target.collect();
         (columns, target)
     }
+}
+
+/// Ordinary samples for each mutation, given [`Metropolis::cells`]: as the noise of both is relative to what they carry, the best ratio is
+/// that of their roots of mean squares, each relative to the brightness of its place.
+fn direct_share(cells: &[[f64; 2]]) -> f32 {
+    let (chains, samples) = cells.iter().fold((0.0, 0.0), |(c, s), [chains, samples]| {
+        let whole = chains + samples;
+        let unit = if whole > 0.0 { 1.0 / whole } else { 0.0 };
+        (c + (chains * unit) * (chains * unit), s + (samples * unit) * (samples * unit))
+    });
+    let ratio = if chains > 0.0 { (samples / chains).sqrt() } else { MOST_SHARE };
+    (SHARE_IF_EQUAL * ratio).clamp(LEAST_SHARE, MOST_SHARE) as f32
 }

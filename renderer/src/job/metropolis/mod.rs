@@ -311,8 +311,8 @@ impl Metropolis {
                 let starts = pool.starts(chains, u);
                 parts.push(Part::Chains { replicate, edges: *edges, b, starts, mutations: length });
             }
-            let direct = constants.direct_share;
-            parts.push(Part::Samples(of_pass.direct(settings, direct, replicate, &films[replicate as usize])));
+            let (share, film) = (constants.direct_share, &films[replicate as usize]);
+            parts.push(Part::Samples(of_pass.direct(settings, share, replicate, film)));
         }
         parts
     }

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::diagnostics::Diagnostics;
+use crate::integrator::View;
 use crate::integrator::mmlt::{Depth, MmltOptions};
-use crate::integrator::{Carried, View};
 use crate::sampling::{IndependentSampler, PrimarySpace, Sampler};
 use crate::scene::Scene;
 use crate::scene::bundle::DiskSource;
@@ -22,19 +22,7 @@ fn each_tail(name: &str, mut see: impl FnMut(&Evaluator<'_>, &Proposal, &Tail, &
     let (mut scene, Diagnostics { .. }) = Scene::load(&source, &root).unwrap();
     scene.camera.aperture_radius = 0.02;
     let view = View::new(&scene, 96, 64, FilterDesc::Box { radius: 0.5 }).unwrap();
-    let c = UnitContext {
-        scene: &scene,
-        view: &view,
-        seed: 0,
-        replicate: 0,
-        max_depth: 8,
-        carried: Carried::ALL,
-        rr_depth: u32::MAX,
-        threshold: 0.0,
-        share: false,
-        selector: &scene.selector,
-        stopped: &|| false,
-    };
+    let c = UnitContext::of_all_paths(&scene, &view, 8);
     let depths = (3..=6u32).map(|edges| Depth { edges, techniques: vec![1.0; edges as usize + 1] }).collect();
     let constants = ChainConstants { depths, columns: 6, target: Vec::new(), threshold: 0.0, direct_share: 1.0 };
     let mut neighbours = Neighbours::new(&c, &constants);
