@@ -7,6 +7,7 @@
 //! Meshes in world space (see `Geometry::bake`) form one tree; instances, spheres and disks lie in a tree above.
 
 mod binary;
+mod bundle;
 mod leaf;
 mod node;
 mod pages;
@@ -14,12 +15,14 @@ mod placed;
 mod plan;
 mod ray;
 mod sah;
+mod shaft;
 mod simd;
 mod traverse;
 mod wide;
 
 use crate::geometry::{Geometry, Hit, Mesh, ObjectId, Shape};
 use crate::math::{Ray, Vec3};
+pub use bundle::MAX_RAYS;
 use placed::{Item, Placed};
 use wide::Tree;
 
@@ -126,6 +129,20 @@ impl Accel {
     pub fn occluded(&self, ray: &Ray) -> bool {
         let t_max = ray.t_max.next_down();
         usable(ray) && (self.world.any(ray, t_max) || self.placed.any(&self.trees, ray, t_max))
+    }
+
+    /// [`Self::occluded`] of each of at most [`MAX_RAYS`] rays, a bit for each: faster if they begin close together and end close together.
+    pub fn occluded_bundle(&self, rays: &[Ray]) -> u64 {
+        let found = if rays.iter().all(usable) { self.world.any_of_bundle(rays) } else { None };
+        let Some(found) = found else {
+            return (0..).zip(rays).fold(0, |hit, (i, ray)| hit | u64::from(self.occluded(ray)) << i);
+        };
+        let placed = |i: u32| self.placed.any(&self.trees, &rays[i as usize], rays[i as usize].t_max.next_down());
+        if self.placed.is_empty() {
+            return found;
+        }
+        let open = (0..rays.len() as u32).filter(|i| found >> i & 1 == 0);
+        open.fold(found, |hit, i| hit | u64::from(placed(i)) << i)
     }
 
     /// Bytes that the trees take.

@@ -106,4 +106,15 @@ impl Leaf {
         self.used |= 1 << lane;
         true
     }
+
+    /// The corners of a triangle.
+    #[inline(always)]
+    pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        let [x, y, z] = &self.vertices;
+        let corner = |c: usize| {
+            let i = usize::from(self.corners[c][lane & 7] & 7);
+            [x[i], y[i], z[i]]
+        };
+        [corner(0), corner(1), corner(2)]
+    }
 }

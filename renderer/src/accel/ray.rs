@@ -25,18 +25,13 @@ pub(super) struct BoxRay {
     negative: [usize; 3],
 }
 
-/// The axes of the shear by that of the direction's largest component.
-static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
 /// Both forms of a ray. Without jumps, since which axis is the largest is as good as random.
 #[inline(always)]
 pub(super) fn prepare(o: Vec3, d: Vec3, reach: f32) -> (BoxRay, Shear) {
+    let axes = Shear::axes(d);
     let (o, d) = (o.to_array(), d.to_array());
     let a = [d[0].abs(), d[1].abs(), d[2].abs()];
-    let (xy, yz) = (larger(a[0], a[1]), larger(a[1], a[2]));
-    let floor = FLAT * larger(xy, a[2]);
-    let first = usize::from(a[0] <= yz);
-    let axes = AXES[first * (2 - usize::from(a[1] > a[2]))];
+    let floor = FLAT * a[axes[2]];
     let steep = [a[0] > floor, a[1] > floor, a[2] > floor];
     let pick = |k: usize| if steep[k] { d[k] } else { floor.copysign(d[k]) };
     let inv = [1.0 / pick(0), 1.0 / pick(1), 1.0 / pick(2)];

@@ -125,6 +125,75 @@ fn hits_are_those_of_brute_force_with_any_instructions() {
     }
 }
 
+/// Segments between points around `from` and points around `to`, some of them from or to the same point, some along an axis.
+fn bundle(s: &mut impl Sampler, from: Vec3, to: Vec3, width: f32) -> Vec<Ray> {
+    let one = s.next_1d() < 0.5;
+    let count = bundle::MIN_RAYS + (s.next_1d() * (MAX_RAYS - bundle::MIN_RAYS + 1) as f32) as usize;
+    (0..count)
+        .map(|i| {
+            let (o, q) = (from + vec3(s) * width, if one { to } else { to + vec3(s) * width });
+            let d = if i % 8 == 0 { (q - o) * [Vec3::X, Vec3::Y, Vec3::Z][i / 8 % 3] } else { q - o };
+            Ray::segment(o, if d == Vec3::ZERO { Vec3::X } else { d }, 0.2 + 1.8 * s.next_1d())
+        })
+        .collect()
+}
+
+#[test]
+fn a_bundle_finds_what_each_ray_finds_with_any_instructions() {
+    // Among triangles of all kinds, from and to points on them, too.
+    for (count, scale, width) in [(3, 1.0, 0.3), (9, 1e-4, 0.1), (300, 1.0, 0.01), (3000, 1e4, 0.003), (3000, 1.0, 0.0)]
+    {
+        let triangles: Vec<_> = soup(count, 5).into_iter().map(|t| t.map(|p| p * scale)).collect();
+        let mut tree = Tree::build(&triangles);
+        let mut s = IndependentSampler::new([29, count as u64]);
+        let (mut bundled, mut met, mut all) = (0, 0, 0);
+        for i in 0..1200 {
+            let on = |s: &mut IndependentSampler| triangles[(s.next_1d() * count as f32) as usize % count][i % 3];
+            let from = if i % 3 == 0 { on(&mut s) } else { vec3(&mut s) * scale };
+            let to = if i % 4 == 0 { on(&mut s) } else { vec3(&mut s) * scale };
+            let rays = bundle(&mut s, from, to, width * scale);
+            for simd in Simd::all() {
+                tree.set_simd(simd);
+                let Some(found) = tree.any_of_bundle(&rays) else { continue };
+                bundled += 1;
+                for (i, ray) in rays.iter().enumerate() {
+                    let alone = tree.any(ray, ray.t_max.next_down());
+                    assert_eq!(found >> i & 1 == 1, alone, "{count} triangles, {simd:?}, ray {i}: {ray:?}");
+                    (met, all) = (met + usize::from(alone), all + 1);
+                }
+            }
+        }
+        assert!(
+            bundled > 300 && met > all / 200 && met < all,
+            "{count}: {bundled} bundles, {met} of {all} rays met anything"
+        );
+    }
+}
+
+#[test]
+fn bundles_that_are_none_find_the_same() {
+    // Among instances, spheres and disks; of rays that lead everywhere, have no end, or are no rays.
+    let accel = Accel::build(&mixed()).unwrap();
+    let mut s = IndependentSampler::new([31]);
+    let mut met = 0;
+    for i in 0..600 {
+        let (from, to) = (vec3(&mut s), vec3(&mut s));
+        let mut rays = bundle(&mut s, from, to, if i % 3 == 0 { 0.02 } else { 1.0 });
+        match i % 4 {
+            0 => rays[2].t_max = f32::INFINITY,
+            1 => rays[1].o = Vec3::NAN,
+            2 => rays.truncate(i / 4 % bundle::MIN_RAYS),
+            _ => {}
+        }
+        let found = accel.occluded_bundle(&rays);
+        for (i, ray) in rays.iter().enumerate() {
+            assert_eq!(found >> i & 1 == 1, accel.occluded(ray), "ray {i}: {ray:?}");
+        }
+        met += found.count_ones();
+    }
+    assert!(met > 1000, "{met} rays met anything");
+}
+
 #[test]
 fn directions_with_negative_zeros_hit_what_positive_zeros_hit() {
     let g = single(ball(24, 1.0));

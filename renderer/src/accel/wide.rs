@@ -1,6 +1,7 @@
 //! Collapses a binary tree into 8-wide nodes and packs its leaves.
 
 use super::binary::{self, BinaryNode, Box3};
+use super::bundle;
 use super::node::{Child, Leaf, Node};
 use super::pages;
 use super::plan::Plan;
@@ -84,6 +85,15 @@ impl Tree {
     #[inline]
     pub fn any(&self, ray: &Ray, t_max: f32) -> bool {
         self.root.is_some_and(|root| traverse::any(self, root, ray, t_max, self.simd))
+    }
+
+    /// Which of some usable rays meet a triangle, a bit for each; `None` if only each alone can tell.
+    #[inline]
+    pub fn any_of_bundle(&self, rays: &[Ray]) -> Option<u64> {
+        if !(bundle::MIN_RAYS..=bundle::MAX_RAYS).contains(&rays.len()) {
+            return None;
+        }
+        self.root.map_or(Some(0), |root| bundle::any(self, root, rays, self.simd))
     }
 
     /// Walks with other instructions, for tests.

@@ -34,20 +34,22 @@ impl Shear {
     /// For a ray whose direction is finite and not zero.
     #[inline(always)]
     pub fn new(o: Vec3, d: Vec3) -> Self {
-        let (o, d, a) = (o.to_array(), d.to_array(), d.abs().to_array());
-        let kz = if a[0] > a[1] && a[0] > a[2] {
-            0
-        } else if a[1] > a[2] {
-            1
-        } else {
-            2
-        };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][kz];
-        let floor = 1e-9 * a[kz];
+        let axes = Self::axes(d);
+        let (o, d) = (o.to_array(), d.to_array());
+        let floor = 1e-9 * d[axes[2]].abs();
         let inv = d.map(|c| if c.abs() > floor { 1.0 / c } else { 0.0 });
         let d = axes.map(|k| d[k]);
         let inv = axes.map(|k| inv[k]);
         Self { axes, o: axes.map(|k| o[k]), d, s: [d[0] * inv[2], d[1] * inv[2], inv[2]], inv }
+    }
+
+    /// The permutation of the axes for a direction. Without jumps, since which component is the largest is as good as random.
+    #[inline(always)]
+    pub fn axes(d: Vec3) -> [usize; 3] {
+        static AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+        let a = d.abs();
+        let first = usize::from(a.x <= a.y || a.x <= a.z);
+        AXES[first * (2 - usize::from(a.y > a.z))]
     }
 
     /// The triangle's hit at a parameter in (0, `t_max`], `t_max` included, so that ties can be settled. Corners in permuted axes.

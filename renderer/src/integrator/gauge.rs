@@ -9,9 +9,11 @@ use crate::spectrum::Rgb;
 const SIDES: [u32; 7] = [8, 6, 5, 4, 3, 2, 1];
 /// Side of blocks before anything is known.
 const FIRST: u32 = 2;
-/// What a join costs, over a ray of a path with what is computed where it arrives: a shadow ray and the value of a BSDF. As measured on
-/// scenes of 36 to 57,000 triangles.
-pub const JOIN: f64 = 0.55;
+/// What a join costs, over a ray of a path with what is computed where it arrives: a shadow ray among others to the same point, and the
+/// value of a BSDF. As counted in instructions.
+pub const JOIN: f64 = 0.35;
+/// What all joins of a second vertex cost together, however many: the tree is walked for all of them.
+const BUNDLE: f64 = 2.5;
 /// What a sample costs beside its rays, in the same unit: numbers, camera ray, film.
 const SAMPLE: f64 = 1.0;
 /// So much must be gained at least: it costs something to keep what may be shared, and what is gained is a guess.
@@ -170,8 +172,8 @@ impl Gauge {
         let sum = |sum: (f64, f64), region: (f64, f64)| (sum.0 + region.0, sum.1 + region.1);
         let (own, reflected) = regions().map(|r| r.relative(floor)).fold((0.0, 0.0), sum);
         let work = |(side, gain): (&u32, &f64)| {
-            let joins = shared * f64::from(side * side - 1);
-            let cost = samples * SAMPLE + rays + JOIN * joins;
+            let joins = if *side > 1 { BUNDLE + JOIN * f64::from(side * side - 1) } else { 0.0 };
+            let cost = samples * SAMPLE + rays + shared * joins;
             // Where nothing has varied yet cost decides.
             let variance = own + reflected * gain + f64::MIN_POSITIVE.sqrt();
             cost * variance * if *side > 1 { KEEPING } else { 1.0 }
@@ -225,7 +227,7 @@ mod tests {
         assert_eq!(gauge().side(TILE.y0, true), FIRST);
         // Nothing to share, nothing that varies, noise that can't be shared.
         assert_eq!([side_after(0.5, 0.0), side_after(0.0, 0.0), side_after(0.5, 0.01)], [1, 1, 1]);
-        let sides = [0.05f32, 0.2, 0.5, 2.0].map(|reflected| side_after(0.05, reflected));
+        let sides = [0.1f32, 0.2, 0.5, 2.0].map(|reflected| side_after(0.05, reflected));
         assert!(sides.windows(2).all(|w| w[0] <= w[1]) && sides[0] > 1 && sides[3] >= 5, "{sides:?}");
     }
 
@@ -235,8 +237,8 @@ mod tests {
         let (own, reflected) = (0.1f64, 0.4);
         let work = |side: u32| {
             let n = f64::from(side * side);
-            let keeping = if side > 1 { KEEPING } else { 1.0 };
-            (SAMPLE + 6.0 + JOIN * (n - 1.0)) * (own * own + reflected * reflected / n) * keeping
+            let (keeping, bundle) = if side > 1 { (KEEPING, BUNDLE) } else { (1.0, 0.0) };
+            (SAMPLE + 6.0 + bundle + JOIN * (n - 1.0)) * (own * own + reflected * reflected / n) * keeping
         };
         let best = SIDES.into_iter().min_by(|a, b| work(*a).total_cmp(&work(*b)));
         assert_eq!(Some(side_after(own as f32, reflected as f32)), best);

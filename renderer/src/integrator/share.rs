@@ -22,7 +22,7 @@ use super::{Carried, UnitContext};
 use crate::bsdf::{DirectionSample, Material, ShadingPoint, Spread, Transport};
 use crate::film::{Counters, Rect, TileSums};
 use crate::light::LightLessons;
-use crate::math::{Anchor, Vec2, Vec3};
+use crate::math::{Anchor, Ray, Vec2, Vec3};
 use crate::path::Scattering;
 use crate::spectrum::Rgb;
 use std::ops::Range;
@@ -155,7 +155,7 @@ pub(super) fn render(
     counters: &mut Counters,
 ) -> Option<TileSums> {
     let mut tile = Tile::new(c, rect);
-    let mut block = Block { c, lessons, counters, pixels: Vec::new(), joined: Vec::new() };
+    let mut block = Block { c, lessons, counters, pixels: Vec::new(), joined: Vec::new(), rays: Vec::new() };
     let mut gauge = Gauge::new(&c.view.filter, rect);
     for index in samples.clone() {
         let mut y = rect.y0;
@@ -206,6 +206,8 @@ struct Pixel {
     place: (u32, u32),
     raster: Vec2,
     kept: Kept,
+    /// Where rays from its first vertex begin, on the side of the geometric normal and on the other.
+    starts: [Vec3; 2],
     /// What comes of it.
     value: Rgb,
 }
@@ -216,8 +218,28 @@ struct Block<'a, 'b> {
     lessons: &'b mut LightLessons,
     counters: &'b mut Counters,
     pixels: Vec<Pixel>,
-    /// First vertices that see the second vertex at hand: number, what would come to the pixel, and the factor from solid angle to area.
-    joined: Vec<(usize, Rgb, f64)>,
+    /// First vertices that see the second vertex at hand.
+    joined: Vec<Join>,
+    /// Rays that tell whether they do.
+    rays: Vec<Ray>,
+}
+
+/// A first vertex and the second vertex of some pixel's path.
+struct Join {
+    /// The pixel of the first vertex.
+    pixel: usize,
+    /// Unit direction from there.
+    w: Vec3,
+    /// What it takes to the pixel.
+    value: Rgb,
+    /// Density per area with which the pixel's path finds the second vertex.
+    density: f64,
+    /// The factor from solid angle to area.
+    to_area: f64,
+    /// Whether a ray tells if they see each other; a pixel's own path does so.
+    traced: bool,
+    /// Whether they do.
+    sees: bool,
 }
 
 impl Block<'_, '_> {
@@ -229,6 +251,8 @@ impl Block<'_, '_> {
         for (place, pixel) in rect.pixels().zip(&mut pixels) {
             let (raster, seen) = self.trace(tile, place, index, &mut pixel.kept);
             (pixel.place, pixel.raster, pixel.value) = (place, raster, seen.own);
+            let first = pixel.kept.first.as_ref().map(|(first, _)| first);
+            pixel.starts = first.map_or([Vec3::ZERO; 2], |first| [first.start(first.ng), first.start(-first.ng)]);
             gauge.see(place, index, seen);
         }
 
@@ -281,8 +305,17 @@ impl Block<'_, '_> {
         if second.radiance.is_black() {
             return;
         }
+        // All rays to it end at the same point, which is on the side of its own path.
+        let distance = self
+            .pixels
+            .iter()
+            .filter_map(|p| p.kept.first.as_ref())
+            .map(|(first, _)| (second.anchor.p - first.p).abs().max_element());
+        let q = second.anchor.end(second.wo, distance.fold(0.0, f32::max));
+
+        // Find the first vertices that may be joined to it.
         self.joined.clear();
-        let mut density = 0.0f64;
+        self.rays.clear();
         for (k, pixel) in self.pixels.iter().enumerate() {
             let Some((first, scattering)) = &pixel.kept.first else { continue };
             let d = second.anchor.p - first.p;
@@ -300,16 +333,35 @@ impl Block<'_, '_> {
             if value.is_black() {
                 continue;
             }
-            if k != j {
-                self.counters.rays += 1;
-                if self.c.scene.accel.occluded(&first.segment_to(&second.anchor)) {
-                    continue;
-                }
-            }
             let to_area = f64::from(w.dot(second.anchor.ng).abs()) / f64::from(d2);
-            density += f64::from(pdf) * to_area;
-            let radiance = if k == j { second.radiance } else { second.radiance_towards(-w) };
-            self.joined.push((k, value * radiance, to_area));
+            let traced = k != j;
+            if traced {
+                let o = pixel.starts[usize::from(w.dot(first.ng) < 0.0)];
+                self.rays.push(Ray::segment(o, q - o, 1.0));
+            }
+            self.joined.push(Join {
+                pixel: k,
+                w,
+                value,
+                density: f64::from(pdf) * to_area,
+                to_area,
+                traced,
+                sees: true,
+            });
+        }
+
+        // Leave out those that don't see it.
+        self.counters.rays += self.rays.len() as u64;
+        let mut hidden = self.c.scene.accel.occluded_bundle(&self.rays);
+        let mut density = 0.0f64;
+        for join in &mut self.joined {
+            if join.traced {
+                join.sees = hidden & 1 == 0;
+                hidden >>= 1;
+            }
+            if join.sees {
+                density += join.density;
+            }
         }
         if !(density > 0.0 && density.is_finite()) {
             // Edge-on, or too near to tell from the first vertex: its own path's, as if it were alone.
@@ -319,10 +371,13 @@ impl Block<'_, '_> {
             }
             return;
         }
-        for &(k, value, to_area) in &self.joined {
-            let share = value * (to_area / density) as f32;
-            if self.counters.admit(share) {
-                self.pixels[k].value += share;
+        for join in self.joined.iter_mut().filter(|join| join.sees) {
+            let radiance = if join.traced { second.radiance_towards(-join.w) } else { second.radiance };
+            join.value *= radiance * (join.to_area / density) as f32;
+        }
+        for join in self.joined.iter().filter(|join| join.sees) {
+            if self.counters.admit(join.value) {
+                self.pixels[join.pixel].value += join.value;
             }
         }
     }

@@ -151,6 +151,10 @@ impl Lanes for Avx2 {
         intrinsic!(_mm256_max_ps(a, b))
     }
     #[inline(always)]
+    fn or_zero(x: __m256, a: __m256, b: __m256) -> __m256 {
+        intrinsic!(_mm256_and_ps(x, _mm256_cmp_ps::<_CMP_LT_OQ>(a, b)))
+    }
+    #[inline(always)]
     fn le(a: __m256, b: __m256) -> u32 {
         intrinsic!(_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b))) as u32
     }

@@ -130,6 +130,10 @@ impl Lanes for Avx512 {
         intrinsic!(_mm256_max_ps(a, b))
     }
     #[inline(always)]
+    fn or_zero(x: __m256, a: __m256, b: __m256) -> __m256 {
+        intrinsic!(_mm256_maskz_mov_ps(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b), x))
+    }
+    #[inline(always)]
     fn le(a: __m256, b: __m256) -> u32 {
         u32::from(intrinsic!(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b)))
     }

@@ -96,6 +96,8 @@ pub(super) trait Lanes {
     fn min(a: Self::F, b: Self::F) -> Self::F;
     /// The larger; of numbers only.
     fn max(a: Self::F, b: Self::F) -> Self::F;
+    /// `x` where `a < b`, else 0.
+    fn or_zero(x: Self::F, a: Self::F, b: Self::F) -> Self::F;
     /// Bit i is set where `a <= b` in lane i; not set where either is NaN.
     fn le(a: Self::F, b: Self::F) -> u32;
 }
@@ -216,6 +218,10 @@ impl Lanes for Portable {
     #[inline(always)]
     fn max(a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn or_zero(x: [f32; 8], a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|i| if a[i] < b[i] { x[i] } else { 0.0 })
     }
     #[inline(always)]
     fn le(a: [f32; 8], b: [f32; 8]) -> u32 {

@@ -198,54 +198,66 @@ fn delta_event(at: &ShadingPoint, transmission: bool) -> Option<DirectionSample>
 pub(super) struct Neighbours<'a> {
     c: &'a UnitContext<'a>,
     constants: &'a ChainConstants,
-    /// Those of a set that contribute: raster positions and contributions.
-    found: Vec<(Vec2, Rgb)>,
+    /// Those of a set that contribute: raster positions, contributions and targets.
+    found: Vec<(Vec2, Rgb, f64)>,
+    /// From the first surfaces of the others to the vertex in common.
+    rays_to: Vec<Ray>,
     /// Rays that were traced.
     pub rays: u64,
 }
 
 impl<'a> Neighbours<'a> {
     pub fn new(c: &'a UnitContext<'a>, constants: &'a ChainConstants) -> Self {
-        Self { c, constants, found: Vec::new(), rays: 0 }
+        Self { c, constants, found: Vec::new(), rays_to: Vec::new(), rays: 0 }
     }
 
     /// Splats `weight` times the path's contribution, dealt to the paths of its set; `bits` move the grid of lattices.
     pub fn splat(&mut self, path: &Proposal, tail: &Tail, weight: f64, bits: u64, splats: &mut SplatSums) {
         let size = Vec2::new(self.c.view.width as f32, self.c.view.height as f32);
-        let own = f64::from(self.constants.target_of(path.value, path.raster, size));
-        let mut sum = own;
+        // Find the paths of the set, visibility left out.
         self.found.clear();
-        self.found.push((path.raster, path.value));
+        self.rays_to.clear();
         // How many steps back the lattice begins.
         let back = |x: f32, bits: u32| (x as i64 + i64::from(bits) % (SIDE * STRIDE)) % (SIDE * STRIDE) / STRIDE;
         let (back_x, back_y) = (back(path.raster.x, (bits >> 32) as u32), back(path.raster.y, bits as u32));
         let steps = (-back_y..SIDE - back_y).flat_map(|j| (-back_x..SIDE - back_x).map(move |i| (i, j)));
         for (i, j) in steps.filter(|step| *step != (0, 0)) {
             let raster = path.raster + Vec2::new((i * STRIDE) as f32, (j * STRIDE) as f32);
-            let Some(joined) = self.joined(tail, raster) else { continue };
+            let Some((end, joined)) = self.joined(tail, raster) else { continue };
             let value = path.value * (joined / tail.own);
             let target = self.constants.target_of(value, raster, size);
             if target > 0.0 {
-                sum += f64::from(target);
-                self.found.push((raster, value));
+                self.found.push((raster, value, f64::from(target)));
+                self.rays_to.push(end.segment_to(&tail.anchor));
             }
         }
+
+        // Leave out those whose first surface does not see the vertex in common.
+        self.rays += self.rays_to.len() as u64;
+        let hidden = self.c.scene.accel.occluded_bundle(&self.rays_to);
+        let mut number = 0;
+        self.found.retain(|_| {
+            number += 1;
+            hidden >> (number - 1) & 1 == 0
+        });
+        let own = f64::from(self.constants.target_of(path.value, path.raster, size));
+        self.found.push((path.raster, path.value, own));
+        let sum: f64 = self.found.iter().map(|(_, _, target)| target).sum();
         if own > 0.0 {
-            for &(raster, value) in &self.found {
+            for &(raster, value, _) in &self.found {
                 splat(self.c, splats, value, raster, weight * own / sum);
             }
         }
     }
 
-    /// What happens on the path of a tail's set through a raster position; `None` if there is none.
-    fn joined(&mut self, tail: &Tail, raster: Vec2) -> Option<Rgb> {
+    /// Where the path of a tail's set through a raster position meets the first surface, and what happens on it, visibility left out;
+    /// `None` if there is none.
+    fn joined(&mut self, tail: &Tail, raster: Vec2) -> Option<(Anchor, Rgb)> {
         if !self.c.view.camera.shows(raster) {
             return None;
         }
         let end = self.end(tail, raster)?;
-        let joined = tail.joined(&end, false)?;
-        self.rays += 1;
-        (!self.c.scene.accel.occluded(&end.anchor.segment_to(&tail.anchor))).then_some(joined)
+        Some((end.anchor, tail.joined(&end, false)?))
     }
 
     /// Follows the camera ray through as many mirrors and glasses as the tail's path met.
