@@ -24,7 +24,7 @@ const MAX_TRIANGLES: usize = 48;
 /// The same for nodes and leaves.
 const MAX_VISITS: usize = 64;
 
-/// Which of at most [`MAX_RAYS`] rays, all usable, meet a triangle; `None` if they don't run close enough together.
+/// Which of at most [`MAX_RAYS`] rays meet a triangle; `None` if they don't run close enough together.
 pub(super) fn any(tree: &Tree, root: Child, rays: &[Ray], simd: Simd) -> Option<u64> {
     let shaft = Shaft::new(rays, tree.reach)?;
     match simd {
@@ -62,8 +62,9 @@ fn any_by<L: Lanes>(tree: &Tree, root: Child, shaft: &Shaft, rays: &[Ray]) -> Op
     let mut packets = Packets { packets: [Packet::EMPTY; MAX_PACKETS], count: 0 };
     packets.fill(rays);
     let mut hit = 0;
-    for packet in &packets.packets[..packets.count] {
-        let lanes = packet.any::<L>(&mut inside.triangles[..inside.count], rays);
+    let packets = &packets.packets[..packets.count];
+    for packet in packets {
+        let lanes = packet.any::<L>(&mut inside.triangles[..inside.count], packets);
         if lanes == 0 {
             continue;
         }
@@ -93,20 +94,16 @@ impl Candidate {
 
     /// Whether [`Shear::plane_distance`] finds nothing within any of the rays, by far more than its roundings: most triangles with a
     /// corner before and one behind an origin are those on which rays begin or end.
-    fn is_apart_from(&mut self, rays: &[Ray]) -> bool {
-        *self.apart.get_or_insert_with(|| {
-            let [a, b, c] = self.corners.map(|p| Vec3::from_array(p).as_dvec3());
-            let n = (b - a).cross(c - a);
-            let misses = |ray: &Ray| {
-                let (o, d) = (a - ray.o.as_dvec3(), ray.d.as_dvec3());
-                let (over, under) = (n.dot(o), n.dot(d));
-                let (over_error, under_error) = (ROUNDING * n.abs().dot(o.abs()), ROUNDING * n.abs().dot(d.abs()));
-                let (height, slope) = (over.abs() - over_error, under.abs() + under_error);
-                let leaves = over * under < 0.0 && under.abs() > under_error;
-                height > 0.0 && (leaves || height > slope * f64::from(ray.t_max))
-            };
-            rays.iter().all(misses)
-        })
+    #[inline(always)]
+    fn is_apart_from(&mut self, packets: &[Packet]) -> bool {
+        if let Some(apart) = self.apart {
+            return apart;
+        }
+        let [a, b, c] = self.corners.map(|p| Vec3::from_array(p).as_dvec3());
+        let n = (b - a).cross(c - a);
+        let apart = packets.iter().all(|p| p.misses_plane(a.to_array(), n.to_array()));
+        self.apart = Some(apart);
+        apart
     }
 }
 
@@ -156,7 +153,8 @@ struct Packet {
     axes: [usize; 3],
     o: [[f32; 8]; 3],
     d: [[f32; 8]; 3],
-    t_max: [f32; 8],
+    /// Exclusive ends.
+    t_end: [f32; 8],
     /// Which ray of the bundle each is.
     numbers: [u8; 8],
     count: usize,
@@ -164,7 +162,14 @@ struct Packet {
 
 impl Packet {
     const EMPTY: Self =
-        Self { axes: [0, 1, 2], o: [[0.0; 8]; 3], d: [[1.0; 8]; 3], t_max: [0.0; 8], numbers: [0; 8], count: 0 };
+        Self { axes: [0, 1, 2], o: [[0.0; 8]; 3], d: [[1.0; 8]; 3], t_end: [0.0; 8], numbers: [0; 8], count: 0 };
+
+    /// Of one ray, on all lanes.
+    #[inline(always)]
+    fn of(axes: [usize; 3], ray: &Ray) -> Self {
+        let all = |v: Vec3| [[v.x; 8], [v.y; 8], [v.z; 8]];
+        Self { axes, o: all(ray.o), d: all(ray.d), t_end: [ray.t_max; 8], numbers: [0; 8], count: 0 }
+    }
 
     /// Sets a lane.
     #[inline(always)]
@@ -174,15 +179,34 @@ impl Packet {
             self.o[k][lane] = ray.o[k];
             self.d[k][lane] = ray.d[k];
         }
-        // `t_max` is exclusive, and distances found are inclusive.
-        self.t_max[lane] = ray.t_max.next_down();
+        self.t_end[lane] = ray.t_max;
         self.numbers[lane] = number as u8;
         self.count += 1;
     }
 
+    /// Whether all rays end before the plane through `a` with the normal `n`, or begin behind it.
+    #[inline(always)]
+    fn misses_plane(&self, a: [f64; 3], n: [f64; 3]) -> bool {
+        let mut misses = true;
+        for lane in 0..8 {
+            let (mut over, mut under, mut over_error, mut under_error) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            for k in 0..3 {
+                let (o, d) = (n[k] * (a[k] - f64::from(self.o[k][lane])), n[k] * f64::from(self.d[k][lane]));
+                (over, under) = (over + o, under + d);
+                (over_error, under_error) = (over_error + ROUNDING * o.abs(), under_error + ROUNDING * d.abs());
+            }
+            let height = over.abs() - over_error;
+            let leaves = (over * under < 0.0) & (under.abs() > under_error);
+            // What is rounded to single precision before it is compared is at least the end that is exclusive.
+            let beyond = height > (under.abs() + under_error) * f64::from(self.t_end[lane]);
+            misses &= (height > 0.0) & (leaves | beyond);
+        }
+        misses
+    }
+
     /// The lanes that hit any of some triangles.
     #[inline(always)]
-    fn any<L: Lanes>(&self, triangles: &mut [Candidate], rays: &[Ray]) -> u32 {
+    fn any<L: Lanes>(&self, triangles: &mut [Candidate], packets: &[Packet]) -> u32 {
         let all = (1u32 << self.count) - 1;
         let mut hit = 0;
         let [kx, ky, kz] = self.axes.map(|k| k % 3);
@@ -194,7 +218,8 @@ impl Packet {
         let inv_x = L::or_zero(L::div(L::splat(1.0), dx), floor, abs::<L>(dx));
         let inv_y = L::or_zero(L::div(L::splat(1.0), dy), floor, abs::<L>(dy));
         let s = [L::mul(dx, sz), L::mul(dy, sz), sz];
-        let t_max = L::load(&self.t_max);
+        // The end is exclusive, and distances found are inclusive.
+        let t_max = self.t_end.map(f32::next_down);
         for triangle in triangles {
             let [a, b, c] = &triangle.corners;
             let a = [L::sub(L::splat(a[kx]), o[0]), L::sub(L::splat(a[ky]), o[1]), L::sub(L::splat(a[kz]), o[2])];
@@ -205,14 +230,14 @@ impl Packet {
             let Some(edges) = Edges::<L>::new(x, y, all & !hit) else { continue };
             let near_x = L::min(L::min(L::mul(a[0], inv_x), L::mul(b[0], inv_x)), L::mul(c[0], inv_x));
             let near_y = L::min(L::min(L::mul(a[1], inv_y), L::mul(b[1], inv_y)), L::mul(c[1], inv_y));
-            let h = edges.hits([a[2], b[2], c[2]], sz, L::max(near_x, near_y), t_max);
+            let h = edges.hits([a[2], b[2], c[2]], sz, L::max(near_x, near_y), L::load(&t_max));
             hit |= h.easy;
             let (mut around, hard) = (h.around & !hit, h.hard & !hit);
-            if around != 0 && triangle.is_apart_from(rays) {
+            if around != 0 && triangle.is_apart_from(packets) {
                 around = 0;
             }
             if around | hard != 0 {
-                hit |= self.rest(around, hard, &triangle.corners, &L::store(h.least_t));
+                hit |= self.rest(around, hard, &triangle.corners, &L::store(h.least_t), &t_max);
             }
             if hit == all {
                 break;
@@ -223,7 +248,7 @@ impl Packet {
 
     /// The lanes that hit a triangle among those without a distance (`around`) and those that only the reference test can decide.
     #[inline(never)]
-    fn rest(&self, mut around: u32, mut hard: u32, corners: &[[f32; 3]; 3], least: &[f32; 8]) -> u32 {
+    fn rest(&self, mut around: u32, mut hard: u32, corners: &[[f32; 3]; 3], least: &[f32; 8], t_max: &[f32; 8]) -> u32 {
         let [a, b, c] = corners.map(|p| self.axes.map(|k| p[k % 3]));
         let shear = |lane: usize| {
             let of = |rows: &[[f32; 8]; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
@@ -234,12 +259,12 @@ impl Packet {
             let lane = around.trailing_zeros() as usize & 7;
             around &= around - 1;
             let t = shear(lane).plane_distance(a, b, c);
-            hit |= u32::from(t.is_some_and(|t| t.max(least[lane]) <= self.t_max[lane])) << lane;
+            hit |= u32::from(t.is_some_and(|t| t.max(least[lane]) <= t_max[lane])) << lane;
         }
         while hard != 0 {
             let lane = hard.trailing_zeros() as usize & 7;
             hard &= hard - 1;
-            hit |= u32::from(shear(lane).intersect(a, b, c, self.t_max[lane]).is_some()) << lane;
+            hit |= u32::from(shear(lane).intersect(a, b, c, t_max[lane]).is_some()) << lane;
         }
         hit
     }
@@ -269,7 +294,7 @@ impl Packets {
             if self.packets.get(*at).is_none_or(|p| p.count == 8) {
                 *at = self.count;
                 self.count += 1;
-                self.packets[*at].axes = axes;
+                self.packets[*at] = Packet::of(axes, ray);
             }
             self.packets[*at].push(number, ray);
         }

@@ -133,16 +133,15 @@ impl Accel {
 
     /// [`Self::occluded`] of each of at most [`MAX_RAYS`] rays, a bit for each: faster if they begin close together and end close together.
     pub fn occluded_bundle(&self, rays: &[Ray]) -> u64 {
-        let found = if rays.iter().all(usable) { self.world.any_of_bundle(rays) } else { None };
-        let Some(found) = found else {
+        let Some(found) = self.world.any_of_bundle(rays) else {
             return (0..).zip(rays).fold(0, |hit, (i, ray)| hit | u64::from(self.occluded(ray)) << i);
         };
-        let placed = |i: u32| self.placed.any(&self.trees, &rays[i as usize], rays[i as usize].t_max.next_down());
         if self.placed.is_empty() {
             return found;
         }
-        let open = (0..rays.len() as u32).filter(|i| found >> i & 1 == 0);
-        open.fold(found, |hit, i| hit | u64::from(placed(i)) << i)
+        let placed = |ray: &Ray| usable(ray) && self.placed.any(&self.trees, ray, ray.t_max.next_down());
+        let open = (0..).zip(rays).filter(|(i, _)| found >> i & 1 == 0);
+        open.fold(found, |hit, (i, ray)| hit | u64::from(placed(ray)) << i)
     }
 
     /// Bytes that the trees take.

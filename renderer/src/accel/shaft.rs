@@ -38,17 +38,21 @@ struct Cut {
 }
 
 impl Shaft {
-    /// Of segments in a tree whose largest coordinate is `reach`; `None` if one of them has no end.
+    /// Of segments in a tree whose largest coordinate is `reach`; `None` if one of them has no end, or is none.
     pub fn new(rays: &[Ray], reach: f32) -> Option<Self> {
         let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let grow = |b: (Vec3, Vec3), p: Vec3| (b.0.min(p), b.1.max(p));
         let (mut from, mut to) = (nothing, nothing);
+        let mut sum = Vec3::ZERO;
         for ray in rays {
-            (from, to) = (grow(from, ray.o), grow(to, ray.o + ray.d * ray.t_max));
+            let (o, end) = (ray.o, ray.o + ray.d * ray.t_max);
+            (from, to) = (grow(from, o), grow(to, end));
+            sum += o + end;
         }
         let (low, high) = (from.0.min(to.0), from.1.max(to.1));
         let span = 2.0 * (reach + low.abs().max(high.abs()).max_element());
-        if !span.is_finite() {
+        // Bounds forget NaN, the sum does not.
+        if !(span.is_finite() && sum.is_finite()) {
             return None;
         }
         let pad = Vec3::splat(PAD * span);

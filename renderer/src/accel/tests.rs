@@ -181,7 +181,7 @@ fn bundles_that_are_none_find_the_same() {
         let mut rays = bundle(&mut s, from, to, if i % 3 == 0 { 0.02 } else { 1.0 });
         match i % 4 {
             0 => rays[2].t_max = f32::INFINITY,
-            1 => rays[1].o = Vec3::NAN,
+            1 => (rays[1].o, rays[2].d) = (Vec3::NAN, Vec3::ZERO),
             2 => rays.truncate(i / 4 % bundle::MIN_RAYS),
             _ => {}
         }

@@ -87,7 +87,7 @@ impl Tree {
         self.root.is_some_and(|root| traverse::any(self, root, ray, t_max, self.simd))
     }
 
-    /// Which of some usable rays meet a triangle, a bit for each; `None` if only each alone can tell.
+    /// Which of some rays meet a triangle, a bit for each; `None` if only each alone can tell.
     #[inline]
     pub fn any_of_bundle(&self, rays: &[Ray]) -> Option<u64> {
         if !(bundle::MIN_RAYS..=bundle::MAX_RAYS).contains(&rays.len()) {

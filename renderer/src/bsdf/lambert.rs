@@ -46,6 +46,11 @@ impl Model for Lambert {
         Spread::Even
     }
 
+    #[inline]
+    fn even(&self) -> Option<Rgb> {
+        Some(self.reflectance * INV_PI)
+    }
+
     fn albedo(&self) -> Rgb {
         self.reflectance
     }

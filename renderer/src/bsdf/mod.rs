@@ -25,7 +25,7 @@ pub use dielectric::Dielectric;
 pub use gltf::Gltf;
 pub use lambert::Lambert;
 pub use microfacet::{Microfacet, SMOOTH_ALPHA};
-pub use shading::{DirectionSample, MAX_NESTING, ShadingPoint, first_bad_nesting};
+pub use shading::{DirectionSample, Even, MAX_NESTING, ShadingPoint, first_bad_nesting};
 
 use crate::math::{Vec2, Vec3};
 use crate::spectrum::Rgb;
@@ -153,6 +153,12 @@ pub trait Model: Copy {
         Spread::Narrow
     }
 
+    /// The value of all directions on the upper side, seen from there, if it is the same for all of them, there is none elsewhere, and
+    /// directions are drawn in proportion to the cosine.
+    fn even(&self) -> Option<Rgb> {
+        None
+    }
+
     /// Rough reflectance for the albedo image, in [0, 1].
     fn albedo(&self) -> Rgb;
 
@@ -244,6 +250,12 @@ macro_rules! bsdfs {
             #[inline]
             pub fn spread(&self) -> Spread {
                 match self { $(Self::$name(m) => m.spread(),)* }
+            }
+
+            /// The value of all directions on the upper side; see [`Model::even`].
+            #[inline]
+            pub fn even(&self) -> Option<Rgb> {
+                match self { $(Self::$name(m) => m.even(),)* }
             }
 
             /// Rough reflectance for the albedo image, in [0, 1].

@@ -35,6 +35,18 @@ impl DirectionSample {
     }
 }
 
+/// A surface that reflects evenly, from the side from which it is seen: directions on the upper side of both normals have the same value,
+/// all others none; they are drawn in proportion to the cosine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Even {
+    /// Value without the cosine.
+    pub f: Rgb,
+    /// Unit shading normal.
+    pub n: Vec3,
+    /// Unit geometric normal.
+    pub ng: Vec3,
+}
+
 /// Which pairs of directions a surface may join, where shading and geometric normal disagree. Every rule treats the two alike,
 /// so that paths from the camera and from the light see the same BSDF.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,6 +169,13 @@ impl ShadingPoint {
         let wi = self.frame.to_world(s.wi).normalize();
         let cos_theta = s.wi.z.abs();
         self.joins(wi, s.wi).then_some(DirectionSample { wi, f: s.f, pdf: s.pdf, cos_theta, lobe: s.lobe, eta: s.eta })
+    }
+
+    /// If it reflects evenly, what it does.
+    pub fn even(&self) -> Option<Even> {
+        let f = self.bsdf.even().filter(|_| self.wo.z > 0.0)?;
+        let ng = if self.wo_dot_ng < 0.0 { -self.ng } else { self.ng };
+        Some(Even { f, n: self.frame.n, ng })
     }
 
     /// `|cos|` of the angle between the world-space direction `w` and the shading normal.

@@ -9,11 +9,13 @@ use crate::spectrum::Rgb;
 const SIDES: [u32; 7] = [8, 6, 5, 4, 3, 2, 1];
 /// Side of blocks before anything is known.
 const FIRST: u32 = 2;
-/// What a join costs, over a ray of a path with what is computed where it arrives: a shadow ray among others to the same point, and the
-/// value of a BSDF. As counted in instructions.
-pub const JOIN: f64 = 0.35;
+/// What it costs to try a join, over a ray of a path with what is computed where it arrives; about half of them take a shadow ray, among
+/// others to the same point. As counted in instructions.
+const JOIN: f64 = 0.2;
 /// What all joins of a second vertex cost together, however many: the tree is walked for all of them.
-const BUNDLE: f64 = 2.5;
+const BUNDLE: f64 = 2.3;
+/// What a join's shadow ray costs, all of this included.
+pub const JOIN_RAY: f64 = 0.4;
 /// What a sample costs beside its rays, in the same unit: numbers, camera ray, film.
 const SAMPLE: f64 = 1.0;
 /// So much must be gained at least: it costs something to keep what may be shared, and what is gained is a guess.

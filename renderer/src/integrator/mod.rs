@@ -12,7 +12,7 @@ pub mod strategies;
 mod tile;
 
 pub use context::{Carried, UnitContext, View};
-pub use gauge::JOIN;
+pub use gauge::JOIN_RAY;
 
 use serde::{Deserialize, Serialize};
 

@@ -15,130 +15,21 @@
 //! while a tile is rendered, and chooses the blocks for what follows. So the samples of a pixel are made by one estimator or another
 //! according to what was found *before*; each has the same expectation, whatever that was, and all count alike: no bias.
 
+mod joints;
+mod kept;
+
 use super::gauge::{Gauge, Seen};
 use super::path::Walk;
 use super::tile::Tile;
 use super::{Carried, UnitContext};
-use crate::bsdf::{DirectionSample, Material, ShadingPoint, Spread, Transport};
+use crate::bsdf::Material;
 use crate::film::{Counters, Rect, TileSums};
 use crate::light::LightLessons;
-use crate::math::{Anchor, Ray, Vec2, Vec3};
-use crate::path::Scattering;
+use crate::math::Vec2;
 use crate::spectrum::Rgb;
+use joints::Joints;
+pub(super) use kept::Kept;
 use std::ops::Range;
-
-/// What a path has to share.
-#[derive(Default)]
-pub(super) struct Kept {
-    /// The first vertex, if there is one.
-    pub first: Option<(Anchor, Scattering)>,
-    /// Value times cosine of the direction taken there, and its density; none for a delta lobe.
-    pub departed: Option<(Rgb, f32)>,
-    /// The direction of the last light that next-event estimation chose, and its radiance times weight over density.
-    pub lit: Option<(Vec3, Rgb)>,
-    /// The second vertex, if it may be shared.
-    second: Option<Second>,
-}
-
-/// A second vertex.
-struct Second {
-    anchor: Anchor,
-    /// Unit shading normal.
-    n: Vec3,
-    /// Unit direction to the first vertex of its own path.
-    wo: Vec3,
-    /// What it reflects along `wo`.
-    radiance: Rgb,
-    /// What reflects, unless it reflects evenly.
-    shading: Option<ShadingPoint>,
-    /// Direction of a light, and its radiance times weight over density.
-    lit: Option<(Vec3, Rgb)>,
-    /// The direction in which its path goes on: weight, density, and what came from there.
-    onward: Option<Onward>,
-}
-
-struct Onward {
-    wi: Vec3,
-    weight: Rgb,
-    pdf: f32,
-    radiance: Rgb,
-}
-
-impl Kept {
-    /// Notes the second vertex of the path, seen along `wo`, if it is to be shared.
-    #[inline]
-    pub fn begin(&mut self, anchor: &Anchor, scattering: &Scattering, wo: Vec3) -> bool {
-        let Scattering::Surface(shading) = scattering else { return false };
-        let spread = shading.bsdf.spread();
-        if self.departed.is_none() || spread == Spread::Narrow {
-            return false;
-        }
-        self.second = Some(Second {
-            anchor: *anchor,
-            n: shading.frame.n,
-            wo,
-            radiance: Rgb::ZERO,
-            shading: (spread == Spread::Broad).then_some(*shading),
-            lit: None,
-            onward: None,
-        });
-        true
-    }
-
-    /// Lights were connected to the second vertex, which reflects `radiance` of them.
-    #[inline]
-    pub fn connected(&mut self, radiance: Rgb) {
-        if let Some(second) = &mut self.second {
-            (second.radiance, second.lit) = (radiance, self.lit);
-        }
-    }
-
-    /// The path goes on from its second vertex.
-    #[inline]
-    pub fn departs(&mut self, s: &DirectionSample) {
-        if let Some(second) = &mut self.second {
-            second.onward = Some(Onward { wi: s.wi, weight: s.weight(), pdf: s.pdf, radiance: Rgb::ZERO });
-        }
-    }
-
-    /// The path has ended, and `radiance` came to its second vertex from where it went on. Whether there is such a vertex.
-    #[inline]
-    pub fn end(&mut self, radiance: Rgb) -> bool {
-        let Some(second) = &mut self.second else { return false };
-        if let Some(onward) = &mut second.onward {
-            onward.radiance = radiance;
-            second.radiance += onward.weight * radiance;
-        }
-        true
-    }
-
-    /// What comes to the pixel from its own path's second vertex, if it is not shared.
-    #[inline]
-    fn unshared(&self) -> Rgb {
-        match (&self.departed, &self.second) {
-            (Some((value, pdf)), Some(second)) => *value * second.radiance * (1.0 / *pdf),
-            _ => Rgb::ZERO,
-        }
-    }
-}
-
-impl Second {
-    /// Whether it is seen from the unit direction `wo` as from that of its own path: the same side of both normals.
-    #[inline]
-    fn is_same_from(&self, wo: Vec3) -> bool {
-        self.anchor.ng.dot(wo) * self.anchor.ng.dot(self.wo) > 0.0 && self.n.dot(wo) * self.n.dot(self.wo) > 0.0
-    }
-
-    /// What it reflects towards the unit direction `wo`, on the side from which its path came. The directions from which light comes
-    /// were drawn for another `wo`, but on the whole side, and weighted by weights that add up to one for each of them.
-    #[inline]
-    fn radiance_towards(&self, wo: Vec3) -> Rgb {
-        let Some(shading) = self.shading.as_ref().map(|s| s.seen_from(wo)) else { return self.radiance };
-        let from = |wi: Vec3, radiance: Rgb| shading.eval(wi, Transport::Radiance) * radiance * shading.abs_cos(wi);
-        let lit = self.lit.map_or(Rgb::ZERO, |(wi, radiance)| from(wi, radiance));
-        self.onward.as_ref().map_or(lit, |o| lit + from(o.wi, o.radiance * (1.0 / o.pdf)))
-    }
-}
 
 /// Whether there may be anything to share.
 pub(super) fn is_of_use(c: &UnitContext<'_>) -> bool {
@@ -155,7 +46,7 @@ pub(super) fn render(
     counters: &mut Counters,
 ) -> Option<TileSums> {
     let mut tile = Tile::new(c, rect);
-    let mut block = Block { c, lessons, counters, pixels: Vec::new(), joined: Vec::new(), rays: Vec::new() };
+    let mut block = Block { c, lessons, counters, pixels: Vec::new(), joints: Joints::default() };
     let mut gauge = Gauge::new(&c.view.filter, rect);
     for index in samples.clone() {
         let mut y = rect.y0;
@@ -206,8 +97,6 @@ struct Pixel {
     place: (u32, u32),
     raster: Vec2,
     kept: Kept,
-    /// Where rays from its first vertex begin, on the side of the geometric normal and on the other.
-    starts: [Vec3; 2],
     /// What comes of it.
     value: Rgb,
 }
@@ -218,28 +107,7 @@ struct Block<'a, 'b> {
     lessons: &'b mut LightLessons,
     counters: &'b mut Counters,
     pixels: Vec<Pixel>,
-    /// First vertices that see the second vertex at hand.
-    joined: Vec<Join>,
-    /// Rays that tell whether they do.
-    rays: Vec<Ray>,
-}
-
-/// A first vertex and the second vertex of some pixel's path.
-struct Join {
-    /// The pixel of the first vertex.
-    pixel: usize,
-    /// Unit direction from there.
-    w: Vec3,
-    /// What it takes to the pixel.
-    value: Rgb,
-    /// Density per area with which the pixel's path finds the second vertex.
-    density: f64,
-    /// The factor from solid angle to area.
-    to_area: f64,
-    /// Whether a ray tells if they see each other; a pixel's own path does so.
-    traced: bool,
-    /// Whether they do.
-    sees: bool,
+    joints: Joints,
 }
 
 impl Block<'_, '_> {
@@ -251,19 +119,18 @@ impl Block<'_, '_> {
         for (place, pixel) in rect.pixels().zip(&mut pixels) {
             let (raster, seen) = self.trace(tile, place, index, &mut pixel.kept);
             (pixel.place, pixel.raster, pixel.value) = (place, raster, seen.own);
-            let first = pixel.kept.first.as_ref().map(|(first, _)| first);
-            pixel.starts = first.map_or([Vec3::ZERO; 2], |first| [first.start(first.ng), first.start(-first.ng)]);
             gauge.see(place, index, seen);
         }
 
         // Share what the second vertices reflect.
-        self.pixels = pixels;
-        for j in 0..self.pixels.len() {
-            self.share(j);
+        self.joints.begin(&pixels);
+        for j in 0..pixels.len() {
+            self.joints.share(&self.c.scene.accel, &mut pixels, j, self.counters);
         }
-        for pixel in &self.pixels {
+        for pixel in &pixels {
             tile.add(pixel.place, pixel.raster, pixel.value);
         }
+        self.pixels = pixels;
     }
 
     /// Samples of a strip that share nothing.
@@ -297,88 +164,5 @@ impl Block<'_, '_> {
         let reflected = if self.counters.admit(reflected) { reflected } else { Rgb::ZERO };
         let first = kept.first.as_ref().map(|(_, scattering)| scattering);
         (raster, Seen::new(first, own, reflected, self.counters.rays - rays))
-    }
-
-    /// Adds what the second vertex of pixel `j` reflects to all pixels whose first vertices see it.
-    fn share(&mut self, j: usize) {
-        let Some(second) = &self.pixels[j].kept.second else { return };
-        if second.radiance.is_black() {
-            return;
-        }
-        // All rays to it end at the same point, which is on the side of its own path.
-        let distance = self
-            .pixels
-            .iter()
-            .filter_map(|p| p.kept.first.as_ref())
-            .map(|(first, _)| (second.anchor.p - first.p).abs().max_element());
-        let q = second.anchor.end(second.wo, distance.fold(0.0, f32::max));
-
-        // Find the first vertices that may be joined to it.
-        self.joined.clear();
-        self.rays.clear();
-        for (k, pixel) in self.pixels.iter().enumerate() {
-            let Some((first, scattering)) = &pixel.kept.first else { continue };
-            let d = second.anchor.p - first.p;
-            let d2 = d.length_squared();
-            let w = d / d2.sqrt();
-            let (value, pdf) = match pixel.kept.departed {
-                Some(departed) if k == j => departed,
-                _ if !(d2 > 0.0 && second.is_same_from(-w)) => continue,
-                _ => {
-                    let (f, pdf) = scattering.eval_pdf(w, Transport::Radiance);
-                    (f * scattering.abs_cos(w), pdf)
-                }
-            };
-            // Where nothing is reflected paths end, so that they do not find the point.
-            if value.is_black() {
-                continue;
-            }
-            let to_area = f64::from(w.dot(second.anchor.ng).abs()) / f64::from(d2);
-            let traced = k != j;
-            if traced {
-                let o = pixel.starts[usize::from(w.dot(first.ng) < 0.0)];
-                self.rays.push(Ray::segment(o, q - o, 1.0));
-            }
-            self.joined.push(Join {
-                pixel: k,
-                w,
-                value,
-                density: f64::from(pdf) * to_area,
-                to_area,
-                traced,
-                sees: true,
-            });
-        }
-
-        // Leave out those that don't see it.
-        self.counters.rays += self.rays.len() as u64;
-        let mut hidden = self.c.scene.accel.occluded_bundle(&self.rays);
-        let mut density = 0.0f64;
-        for join in &mut self.joined {
-            if join.traced {
-                join.sees = hidden & 1 == 0;
-                hidden >>= 1;
-            }
-            if join.sees {
-                density += join.density;
-            }
-        }
-        if !(density > 0.0 && density.is_finite()) {
-            // Edge-on, or too near to tell from the first vertex: its own path's, as if it were alone.
-            let alone = self.pixels[j].kept.unshared();
-            if self.counters.admit(alone) {
-                self.pixels[j].value += alone;
-            }
-            return;
-        }
-        for join in self.joined.iter_mut().filter(|join| join.sees) {
-            let radiance = if join.traced { second.radiance_towards(-join.w) } else { second.radiance };
-            join.value *= radiance * (join.to_area / density) as f32;
-        }
-        for join in self.joined.iter().filter(|join| join.sees) {
-            if self.counters.admit(join.value) {
-                self.pixels[join.pixel].value += join.value;
-            }
-        }
     }
 }

@@ -15,7 +15,7 @@ use super::metropolis;
 use super::rendering::Rendering;
 use super::settings::{Budget, RenderSettings};
 use crate::film::{Counters, Filter};
-use crate::integrator::{IntegratorKind, JOIN};
+use crate::integrator::{IntegratorKind, JOIN_RAY};
 use crate::sampling::hash_words;
 use measure::{Part, Sample};
 use serde::{Deserialize, Serialize};
@@ -246,7 +246,7 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
     let each = |c: &Counters, kind| if c.samples == 0 { 0.0 } else { work_of(c, kind) / c.samples as f64 };
     let unit = {
         let of = |r: &Rendering| each(&r.spent().samples, IntegratorKind::Path);
-        of(alone) + JOIN * (of(path) - of(alone)).max(0.0)
+        of(alone) + JOIN_RAY * (of(path) - of(alone)).max(0.0)
     };
     // What its own trial shows, or bidirectional samples of what it would find seldom, or has to miss.
     let seen = path_sample.relative_variance(&weights, false) * of_group(path);
