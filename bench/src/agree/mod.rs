@@ -44,7 +44,7 @@ pub struct Args {
 enum Budget {
     /// Two minutes or so: image means to 2 % and better, those of mmlt to 25 %
     Quick,
-    /// Up to half an hour: image means to 0.3 %
+    /// An hour or so on two cores: image means to 0.3 %
     Full,
 }
 

@@ -27,7 +27,7 @@ const ALIKE: f32 = 0.95;
 const REGION: u32 = 16;
 /// Keeps relative errors from dividing by the darkness of black regions: this share of the tile's brightness, whatever its scale.
 const FLOOR: f64 = 0.1;
-/// Of so many strips one is watched.
+/// Of so many strips one is watched, and at least one of each band: what is watched in one decides for the next.
 const WATCHED: u32 = 4;
 /// Height of a strip in pixels.
 const STRIP: u32 = 4;
@@ -123,6 +123,11 @@ impl Gauge {
         (self.rect.y0 + ((y - self.rect.y0) / band + 1) * band).min(self.rect.y1)
     }
 
+    /// Whether row `y` is the first of a band.
+    pub fn begins_band(&self, y: u32) -> bool {
+        (y - self.rect.y0).is_multiple_of(self.band())
+    }
+
     /// Where the strip that holds row `y` ends.
     pub fn strip_end(&self, y: u32) -> u32 {
         (self.rect.y0 + ((y - self.rect.y0) / STRIP + 1) * STRIP).min(self.rect.y1)
@@ -130,7 +135,8 @@ impl Gauge {
 
     /// Whether sample `index` of the pixels of row `y` is watched.
     pub fn watches(&self, y: u32, index: u32) -> bool {
-        ((y - self.rect.y0) / STRIP + index).is_multiple_of(WATCHED)
+        let strips = self.band() / STRIP;
+        ((y - self.rect.y0) / STRIP % strips + index).is_multiple_of(WATCHED.min(strips))
     }
 
     /// Sample `index` of pixel (x, y), if it is one of those that are watched. Pixels of a row come from left to right.
@@ -231,6 +237,17 @@ mod tests {
         assert_eq!([side_after(0.5, 0.0), side_after(0.0, 0.0), side_after(0.5, 0.01)], [1, 1, 1]);
         let sides = [0.1f32, 0.2, 0.5, 2.0].map(|reflected| side_after(0.05, reflected));
         assert!(sides.windows(2).all(|w| w[0] <= w[1]) && sides[0] > 1 && sides[3] >= 5, "{sides:?}");
+    }
+
+    /// However low the tile, its first sample tells of both halves, so that no band goes on without knowing anything.
+    #[test]
+    fn both_halves_are_watched_from_the_first() {
+        for height in 9..70 {
+            let mut gauge =
+                Gauge::new(&Filter::new(&FilterDesc::Box { radius: 0.5 }, 256, 256), Rect { y1: 64 + height, ..TILE });
+            watch(&mut gauge, 64..64 + height, 0, 0.05, 2.0);
+            assert!(gauge.halves.iter().all(|h| h.samples > 0.0), "{height} rows");
+        }
     }
 
     /// With samples a and b of variance V alone and `V / n` shared by n, the best of the sides is that of least cost times variance.

@@ -60,12 +60,11 @@ pub(super) fn render(
                 block.render_alone(&mut tile, Rect { y0: y, y1, ..rect }, index, &mut gauge);
                 y1
             } else {
-                // The grid of blocks moves, so that its borders do not show.
-                let grid = Grid { side, shift: [index, index / side] };
-                let y1 = grid.end(1, y).min(gauge.band_end(y));
+                let band = gauge.band_end(y);
+                let y1 = y + cut(band - y, side, gauge.begins_band(y).then_some(index * 5 + 3));
                 let mut x = rect.x0;
                 while x < rect.x1 {
-                    let x1 = grid.end(0, x).min(rect.x1);
+                    let x1 = x + cut(rect.x1 - x, side, (x == rect.x0).then_some(index));
                     block.render(&mut tile, Rect { x0: x, y0: y, x1, y1 }, index, &mut gauge);
                     x = x1;
                 }
@@ -77,18 +76,16 @@ pub(super) fn render(
     Some(tile.finish(samples.end - samples.start))
 }
 
-/// Blocks of pixels.
-struct Grid {
-    side: u32,
-    shift: [u32; 2],
-}
-
-impl Grid {
-    /// Where the block that holds a pixel ends, along an axis.
-    fn end(&self, axis: usize, pixel: u32) -> u32 {
-        let shift = self.shift[axis] % self.side;
-        (pixel + shift) / self.side * self.side + self.side - shift
-    }
+/// The length of the first of the blocks of about `side` into which `length` pixels are cut: as long as the others, so that none of them
+/// has few pixels to share with, or, by `jitter`, up to a quarter more or less: borders between blocks would show if they did not move.
+fn cut(length: u32, side: u32, jitter: Option<u32>) -> u32 {
+    const EIGHTHS: [i32; 8] = [0, 4, -2, 2, -4, 1, 3, -3];
+    let count = ((length + side / 2) / side).max(1);
+    let more = jitter.map_or(0, |j| EIGHTHS[j as usize % 8]);
+    // In sixteenths of a block, rounded.
+    let count = i64::from(count);
+    let cut = ((i64::from(length) * i64::from(16 + more) + 8 * count) / (16 * count)) as u32;
+    if count == 1 { length } else { cut.clamp(1, length) }
 }
 
 /// A sample of a pixel.
@@ -164,5 +161,31 @@ impl Block<'_, '_> {
         let reflected = if self.counters.admit(reflected) { reflected } else { Rgb::ZERO };
         let first = kept.first.as_ref().map(|(_, scattering)| scattering);
         (raster, Seen::new(first, own, reflected, self.counters.rays - rays))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cut;
+
+    #[test]
+    fn blocks_are_about_as_long_as_they_should_be() {
+        for length in 1..80u32 {
+            for side in 2..=8 {
+                for jitter in 0..16 {
+                    let (mut left, mut first, mut blocks) = (length, true, Vec::new());
+                    while left > 0 {
+                        blocks.push(cut(left, side, first.then_some(jitter)));
+                        (left, first) = (left - blocks[blocks.len() - 1], false);
+                    }
+                    assert_eq!(blocks.iter().sum::<u32>(), length);
+                    let about = |b: &u32| 2 * b >= side.min(length) && 2 * b <= 3 * side + 2;
+                    assert!(blocks.iter().all(about), "{length} in blocks of {side}, {jitter}: {blocks:?}");
+                }
+            }
+        }
+        // Borders move.
+        let borders: std::collections::BTreeSet<u32> = (0..8).map(|i| cut(64, 8, Some(i))).collect();
+        assert!(borders.len() >= 4, "{borders:?}");
     }
 }

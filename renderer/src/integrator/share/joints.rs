@@ -2,7 +2,7 @@
 
 use super::Pixel;
 use super::kept::Second;
-use crate::accel::Accel;
+use crate::accel::{Accel, MAX_RAYS};
 use crate::bsdf::{Even, Transport};
 use crate::film::Counters;
 use crate::math::{INV_PI, Ray, Vec3};
@@ -72,12 +72,16 @@ impl Joints {
 
         // Leave out those that don't see it.
         counters.rays += self.rays.len() as u64;
-        let mut hidden = accel.occluded_bundle(&self.rays);
-        let mut density = 0.0f64;
+        let mut bundles = self.rays.chunks(MAX_RAYS);
+        let (mut hidden, mut known, mut density) = (0, 0, 0.0f64);
         for join in &mut self.joined {
             if join.traced {
+                if known == 0 {
+                    let bundle = bundles.next().unwrap_or_default();
+                    (hidden, known) = (accel.occluded_bundle(bundle), bundle.len());
+                }
                 join.sees = hidden & 1 == 0;
-                hidden >>= 1;
+                (hidden, known) = (hidden >> 1, known.saturating_sub(1));
             }
             if join.sees {
                 density += join.density;

@@ -105,9 +105,9 @@ impl Sample {
     /// did not find: what n samples have missed has a probability of about 1 / n at most, and so a variance of n times its square.
     pub fn unseen(&self, full: &Self, samples: f64) -> f64 {
         let (across, down) = (full.width.div_ceil(BLOCK), full.height.div_ceil(BLOCK));
+        let blocks = |of: &Self| Block::steadied((0..across * down).map(|i| of.block(i, across, full)).collect());
         let mut sum = 0.0;
-        for block in 0..across * down {
-            let (own, theirs) = (self.block(block, across, full), full.block(block, across, full));
+        for (own, theirs) in blocks(self).iter().zip(&blocks(full)) {
             let (Some(own), Some(theirs)) = (own, theirs) else { continue };
             let lack = theirs.mean - own.mean;
             let noise = own.variance + theirs.variance;
@@ -147,6 +147,20 @@ struct Block {
     pixels: f64,
 }
 
+impl Block {
+    /// With no less variance than is usual: few groups show too little of it now and then, and then chance looks like certainty.
+    fn steadied(mut blocks: Vec<Option<Self>>) -> Vec<Option<Self>> {
+        let relative = |b: &Self| b.variance / (b.mean * b.mean);
+        let mut all: Vec<f64> = blocks.iter().flatten().map(relative).filter(|v| v.is_finite()).collect();
+        all.sort_by(f64::total_cmp);
+        let usual = all.get(all.len() / 2).copied().unwrap_or(0.0);
+        for block in blocks.iter_mut().flatten() {
+            block.variance = block.variance.max(usual * block.mean * block.mean);
+        }
+        blocks
+    }
+}
+
 /// `1 / (I^2 + 0.01)` by pixel.
 pub struct Weights {
     width: usize,
@@ -158,5 +172,21 @@ impl Weights {
     /// The place of a pixel of a film of another size.
     fn at(&self, x: usize, y: usize, width: usize, height: usize) -> usize {
         y * self.height / height * self.width + x * self.width / width
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Block;
+
+    #[test]
+    fn blocks_without_scatter_get_what_is_usual() {
+        let block = |mean: f64, variance: f64| Some(Block { mean, variance, pixels: 16.0 });
+        let blocks = vec![block(1.0, 0.01), block(2.0, 1e-9), None, block(1.0, 0.5), block(0.0, 0.0), block(1.0, 0.02)];
+        let steadied = Block::steadied(blocks);
+        let variances: Vec<f64> = steadied.iter().flatten().map(|b| b.variance).collect();
+        // The usual relative variance is the median, 0.02; a black block has none.
+        assert_eq!(variances, [0.02, 0.08, 0.5, 0.0, 0.02]);
+        assert!(steadied[2].is_none() && Block::steadied(Vec::new()).is_empty());
     }
 }
