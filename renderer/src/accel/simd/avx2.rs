@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::mem::MaybeUninit;
 
 /// AVX2 and FMA. Its functions may only run in callees of a function that enables both after they were detected; the
-/// traversal entry points in `traverse.rs` are the only ones.
+/// entry points in `traverse.rs` and `bundle.rs` are the only ones.
 pub struct Avx2;
 
 /// An intrinsic of AVX2 or FMA.

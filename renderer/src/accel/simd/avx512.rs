@@ -5,7 +5,7 @@ use std::arch::x86_64::*;
 use std::mem::MaybeUninit;
 
 /// AVX-512 on eight lanes: masks and twice the registers. Its functions may only run in callees of a function that enables the
-/// features after they were detected; the traversal entry points in `traverse.rs` are the only ones.
+/// features after they were detected; the entry points in `traverse.rs` and `bundle.rs` are the only ones.
 pub struct Avx512;
 
 /// An intrinsic of AVX-512 or less.
