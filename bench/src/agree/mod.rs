@@ -44,7 +44,7 @@ pub struct Args {
 enum Budget {
     /// Two minutes or so: image means to 2 % and better, those of mmlt to 25 %
     Quick,
-    /// An hour or so on two cores: image means to 0.3 %
+    /// Hours: image means to 0.3 %
     Full,
 }
 
