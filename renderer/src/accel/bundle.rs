@@ -14,7 +14,7 @@ use crate::geometry::triangle::Shear;
 use crate::math::{Ray, Vec3};
 
 /// Most rays of a bundle: a bit for each.
-pub const MAX_RAYS: usize = 64;
+pub(super) const MAX_RAYS: usize = 64;
 /// With fewer rays to walk the tree with each costs less.
 pub(super) const MIN_RAYS: usize = 3;
 /// Eight rays each, and a rest for each axis.
@@ -23,6 +23,9 @@ const MAX_PACKETS: usize = MAX_RAYS / 8 + 2;
 const MAX_TRIANGLES: usize = 48;
 /// The same for nodes and leaves.
 const MAX_VISITS: usize = 64;
+
+/// Relative, of a few operations in f64, with room to spare.
+const ROUNDING: f64 = 1e-13;
 
 /// Which of at most [`MAX_RAYS`] rays meet a triangle; `None` if they don't run close enough together.
 pub(super) fn any(tree: &Tree, root: Child, rays: &[Ray], simd: Simd) -> Option<u64> {
@@ -106,9 +109,6 @@ impl Candidate {
         apart
     }
 }
-
-/// Relative, of a few operations in f64, with room to spare.
-const ROUNDING: f64 = 1e-13;
 
 impl Inside {
     /// Finds them; `None` if there are too many.
@@ -213,7 +213,7 @@ impl Packet {
         // Prepare the rays as `Shear::new` does.
         let o = [L::load(&self.o[kx]), L::load(&self.o[ky]), L::load(&self.o[kz])];
         let [dx, dy, dz] = [L::load(&self.d[kx]), L::load(&self.d[ky]), L::load(&self.d[kz])];
-        let floor = L::mul(L::splat(1e-9), abs::<L>(dz));
+        let floor = L::mul(L::splat(Shear::FLAT), abs::<L>(dz));
         let sz = L::div(L::splat(1.0), dz);
         let inv_x = L::or_zero(L::div(L::splat(1.0), dx), floor, abs::<L>(dx));
         let inv_y = L::or_zero(L::div(L::splat(1.0), dy), floor, abs::<L>(dy));

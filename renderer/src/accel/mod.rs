@@ -22,7 +22,6 @@ mod wide;
 
 use crate::geometry::{Geometry, Hit, Mesh, ObjectId, Shape};
 use crate::math::{Ray, Vec3};
-pub use bundle::MAX_RAYS;
 use placed::{Item, Placed};
 use wide::Tree;
 
@@ -131,8 +130,16 @@ impl Accel {
         usable(ray) && (self.world.any(ray, t_max) || self.placed.any(&self.trees, ray, t_max))
     }
 
-    /// [`Self::occluded`] of each of at most [`MAX_RAYS`] rays, a bit for each: faster if they begin close together and end close together.
-    pub fn occluded_bundle(&self, rays: &[Ray]) -> u64 {
+    /// [`Self::occluded`] of each ray: faster if they begin close together and end close together.
+    pub fn occluded_each<'a>(&'a self, rays: &'a [Ray]) -> impl Iterator<Item = bool> + 'a {
+        rays.chunks(bundle::MAX_RAYS).flat_map(|rays| {
+            let hidden = self.occluded_bundle(rays);
+            (0..rays.len()).map(move |i| hidden >> i & 1 == 1)
+        })
+    }
+
+    /// The same of at most [`bundle::MAX_RAYS`] rays, a bit for each.
+    fn occluded_bundle(&self, rays: &[Ray]) -> u64 {
         let Some(found) = self.world.any_of_bundle(rays) else {
             return (0..).zip(rays).fold(0, |hit, (i, ray)| hit | u64::from(self.occluded(ray)) << i);
         };

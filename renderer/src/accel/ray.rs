@@ -8,8 +8,6 @@ use crate::math::Vec3;
 /// Relative to the largest coordinate: covers the roundings of the box test (four operations on numbers of that size, fused or
 /// not) and those of the sheared corners of the triangle test (three), twice over.
 const PAD: f32 = 16.0 * f32::EPSILON;
-/// A direction component this small against the largest moves the ray by less than the padding within the scene.
-const FLAT: f32 = 1e-9;
 
 /// A ray prepared for box tests: `t = plane * inv + offset`, with padded offsets.
 ///
@@ -31,7 +29,7 @@ pub(super) fn prepare(o: Vec3, d: Vec3, reach: f32) -> (BoxRay, Shear) {
     let axes = Shear::axes(d);
     let (o, d) = (o.to_array(), d.to_array());
     let a = [d[0].abs(), d[1].abs(), d[2].abs()];
-    let floor = FLAT * a[axes[2]];
+    let floor = Shear::FLAT * a[axes[2]];
     let steep = [a[0] > floor, a[1] > floor, a[2] > floor];
     let pick = |k: usize| if steep[k] { d[k] } else { floor.copysign(d[k]) };
     let inv = [1.0 / pick(0), 1.0 / pick(1), 1.0 / pick(2)];

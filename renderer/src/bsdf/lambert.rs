@@ -1,5 +1,5 @@
 use super::resolve::At;
-use super::{BsdfSample, Lobe, Model, Spread, Transport};
+use super::{BsdfSample, Lobe, Model, Transport};
 use crate::math::{INV_PI, Vec2, Vec3};
 use crate::sampling::warp;
 use crate::spectrum::Rgb;
@@ -39,11 +39,6 @@ impl Model for Lambert {
     #[inline]
     fn chooses(&self) -> bool {
         false
-    }
-
-    #[inline]
-    fn spread(&self) -> Spread {
-        Spread::Even
     }
 
     #[inline]

@@ -150,7 +150,7 @@ pub trait Model: Copy {
 
     /// How what it reflects depends on the direction from which it is seen.
     fn spread(&self) -> Spread {
-        Spread::Narrow
+        if self.even().is_some() { Spread::Even } else { Spread::Narrow }
     }
 
     /// The value of all directions on the upper side, seen from there, if it is the same for all of them, there is none elsewhere, and

@@ -31,12 +31,15 @@ pub struct TriangleHit {
 }
 
 impl Shear {
+    /// A direction component this small against the largest moves a ray by less than rounding does within the scene.
+    pub const FLAT: f32 = 1e-9;
+
     /// For a ray whose direction is finite and not zero.
     #[inline(always)]
     pub fn new(o: Vec3, d: Vec3) -> Self {
         let axes = Self::axes(d);
         let (o, d) = (o.to_array(), d.to_array());
-        let floor = 1e-9 * d[axes[2]].abs();
+        let floor = Self::FLAT * d[axes[2]].abs();
         let inv = d.map(|c| if c.abs() > floor { 1.0 / c } else { 0.0 });
         let d = axes.map(|k| d[k]);
         let inv = axes.map(|k| inv[k]);

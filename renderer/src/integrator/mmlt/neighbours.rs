@@ -234,12 +234,8 @@ impl<'a> Neighbours<'a> {
 
         // Leave out those whose first surface does not see the vertex in common.
         self.rays += self.rays_to.len() as u64;
-        let hidden = self.c.scene.accel.occluded_bundle(&self.rays_to);
-        let mut number = 0;
-        self.found.retain(|_| {
-            number += 1;
-            hidden >> (number - 1) & 1 == 0
-        });
+        let mut hidden = self.c.scene.accel.occluded_each(&self.rays_to);
+        self.found.retain(|_| hidden.next() == Some(false));
         let own = f64::from(self.constants.target_of(path.value, path.raster, size));
         self.found.push((path.raster, path.value, own));
         let sum: f64 = self.found.iter().map(|(_, _, target)| target).sum();

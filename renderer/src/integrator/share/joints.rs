@@ -2,7 +2,7 @@
 
 use super::Pixel;
 use super::kept::Second;
-use crate::accel::{Accel, MAX_RAYS};
+use crate::accel::Accel;
 use crate::bsdf::{Even, Transport};
 use crate::film::Counters;
 use crate::math::{INV_PI, Ray, Vec3};
@@ -72,21 +72,11 @@ impl Joints {
 
         // Leave out those that don't see it.
         counters.rays += self.rays.len() as u64;
-        let mut bundles = self.rays.chunks(MAX_RAYS);
-        let (mut hidden, mut known, mut density) = (0, 0, 0.0f64);
-        for join in &mut self.joined {
-            if join.traced {
-                if known == 0 {
-                    let bundle = bundles.next().unwrap_or_default();
-                    (hidden, known) = (accel.occluded_bundle(bundle), bundle.len());
-                }
-                join.sees = hidden & 1 == 0;
-                (hidden, known) = (hidden >> 1, known.saturating_sub(1));
-            }
-            if join.sees {
-                density += join.density;
-            }
+        let traced = self.joined.iter_mut().filter(|join| join.traced);
+        for (join, hidden) in traced.zip(accel.occluded_each(&self.rays)) {
+            join.sees = !hidden;
         }
+        let density: f64 = self.joined.iter().filter(|join| join.sees).map(|join| join.density).sum();
         if !(density > 0.0 && density.is_finite()) {
             // Edge-on, or too near to tell from the first vertex: its own path's, as if it were alone.
             let alone = pixels[j].kept.unshared();

@@ -24,7 +24,7 @@ pub(super) struct Second {
     /// Unit shading normal.
     n: Vec3,
     /// Unit direction to the first vertex of its own path.
-    pub wo: Vec3,
+    wo: Vec3,
     /// What it reflects along `wo`.
     pub radiance: Rgb,
     /// What reflects, unless it reflects evenly.
