@@ -88,10 +88,10 @@ fn a_time_budget_ends_with_a_whole_pass() {
 #[test]
 fn a_target_error_is_met_when_the_job_says_so() {
     let scene = scene();
-    let s = settings(&scene, RenderOptions { target_error: Some(0.05), ..Default::default() });
+    let s = settings(&scene, RenderOptions { target_error: Some(0.01), ..Default::default() });
     let image = common::render_with(&scene, &s, 2);
     let error = image.error.unwrap();
-    assert!(error.upper95 <= 0.05, "{error:?}");
+    assert!(error.upper95 <= 0.01, "{error:?}");
     // Against a far better image: the root of the mean relative squared error is what was promised.
     let mut better = s.clone();
     better.budget = renderer::job::Budget { spp: Some(image.samples[0] as u32 * 8), ..Default::default() };
@@ -105,7 +105,7 @@ fn a_target_error_is_met_when_the_job_says_so() {
         .map(|(a, b)| f64::from((a - b) * (a - b) / (b * b + 0.01)))
         .sum();
     let actual = (squared / image.mean.len() as f64 / 3.0).sqrt();
-    assert!(actual <= 0.05 && actual > 0.01, "promised 0.05, found {actual}");
+    assert!(actual <= 0.01 && actual > 0.002, "promised 0.01, found {actual}");
 }
 
 #[test]

@@ -6,7 +6,7 @@
 mod common;
 
 use common::{camera, deviations, emission, lambert, render_with, shape};
-use renderer::bsdf::{Material, MaterialId};
+use renderer::bsdf::{Distribution, Material, MaterialId, Roughness};
 use renderer::film::MergedImage;
 use renderer::integrator::IntegratorKind;
 use renderer::integrator::mmlt::MmltOptions;
@@ -123,9 +123,54 @@ fn glow() -> Scene {
     })
 }
 
+/// Lights of all kinds on a diffuse floor, a glossy plate, a mirror and a ball behind glass: some are found by samples of lights alone,
+/// some by rays alone, and most by both.
+fn lamps() -> Scene {
+    let lamp = |shape: ShapeDesc, radiance: f32| ShapeDesc { emission: emission(radiance), ..shape };
+    let mut screen = lamp(wall(DVec3::new(-0.9, 0.0, -0.4), DVec3::new(1.0, -0.2, 0.5).normalize(), 0), 1.5);
+    screen.to_world *= DAffine3::from_scale(DVec3::splat(0.3));
+    let plate = |x: f64, n: DVec3, material: u32| {
+        let mut plate = wall(DVec3::new(x, -0.7, 0.2), n.normalize(), material);
+        plate.to_world *= DAffine3::from_scale(DVec3::splat(0.4));
+        plate
+    };
+    let point = LightDesc::Point { position: DVec3::new(0.9, 0.6, 0.8), intensity: Rgb::splat(0.3) };
+    let sky = LightDesc::Constant { radiance: Rgb::new(0.05, 0.1, 0.2) };
+    common::build(SceneDesc {
+        shapes: vec![
+            wall(DVec3::NEG_Y, DVec3::Y, 0),
+            wall(DVec3::NEG_Z, DVec3::Z, 0),
+            plate(-0.5, DVec3::new(0.2, 1.0, 0.3), 1),
+            plate(0.5, DVec3::new(-0.3, 0.6, 1.0), 2),
+            ball(DVec3::new(0.0, -0.6, 0.6), 0.2, 3),
+            lamp(ball(DVec3::new(0.3, 0.5, -0.2), 0.1, 0), 20.0),
+            screen,
+        ],
+        materials: vec![
+            lambert(0.6),
+            coated(Rgb::new(0.9, 0.7, 0.4), 1.0, 0.2),
+            coated(Rgb::new(0.2, 0.5, 0.7), 0.0, 0.0),
+            Material::Dielectric {
+                eta: 1.5,
+                reflectance: RgbParam::Const(Rgb::ONE),
+                transmittance: RgbParam::Const(Rgb::ONE),
+                roughness: Some(Roughness {
+                    distribution: Distribution::Ggx,
+                    alpha_u: FloatParam::Const(0.3),
+                    alpha_v: FloatParam::Const(0.3),
+                }),
+            },
+        ],
+        lights: vec![point, sky],
+        camera: camera(DVec3::new(0.0, 0.2, 3.2), DVec3::new(0.0, -0.2, 0.0), 38.0),
+        ..SceneDesc::default()
+    })
+}
+
 fn renders(scene: &Scene, options: &RenderOptions, first: u64) -> Vec<MergedImage> {
     let of = |seed| {
-        let options = RenderOptions { max_depth: Some(6), seed: Some(seed), ..options.clone() };
+        let max_depth = options.max_depth.or(Some(6));
+        let options = RenderOptions { max_depth, seed: Some(seed), ..options.clone() };
         render_with(scene, &RenderSettings::resolve(&options, &scene.defaults).unwrap(), 2)
     };
     (first..first + RENDERS).map(of).collect()
@@ -175,6 +220,16 @@ fn gain([first, second]: &[Vec<MergedImage>; 2]) -> f64 {
 fn shared_paths_make_the_same_image_with_less_noise() {
     let gain = gain(&compared(&room(false), [path(40, true), path(40, false)]));
     assert!(gain > 2.0, "variance is only {gain} times less");
+}
+
+/// Several samples of lights at first vertices, without anything to share and with it.
+#[test]
+fn several_samples_of_lights_make_the_same_image_with_less_noise() {
+    let scene = lamps();
+    let direct = |share| RenderOptions { max_depth: Some(2), ..path(24, share) };
+    let gain = gain(&compared(&scene, [direct(true), direct(false)]));
+    assert!(gain > 1.2, "variance is only {gain} times less");
+    compared(&scene, [path(24, true), path(24, false)]);
 }
 
 /// Light of coated surfaces depends on where it goes: what is shared is not what the path itself found.

@@ -1,8 +1,10 @@
-//! How large the blocks of pixels should be that share their paths ([`super::share`]).
+//! How large the blocks of pixels should be that share their paths ([`super::share`]), and how many samples of lights their first vertices
+//! should take.
 
+use super::path::LIGHTS;
+use super::share::Kept;
 use crate::film::{Filter, Rect};
 use crate::math::Vec3;
-use crate::path::Scattering;
 use crate::spectrum::Rgb;
 
 /// Sides of blocks, in pixels; the largest first, which is best where it costs nothing.
@@ -16,12 +18,14 @@ const JOIN: f64 = 0.2;
 const BUNDLE: f64 = 2.3;
 /// What a join's shadow ray costs, all of this included.
 pub const JOIN_RAY: f64 = 0.4;
+/// What each further sample of a light costs, its ray included, in the same unit; as timed.
+const LIGHT: f64 = 0.9;
 /// What a sample costs beside its rays, in the same unit: numbers, camera ray, film.
 const SAMPLE: f64 = 1.0;
 /// So much must be gained at least: it costs something to keep what may be shared, and what is gained is a guess.
 const KEEPING: f64 = 1.1;
-/// Neighbours are compared if their normals have at least this cosine, and their albedos are as near to each other: what differs
-/// otherwise is not noise.
+/// Neighbours are alike if their normals have at least this cosine, and their albedos are as near to each other: what is
+/// reflected to others differs by more than noise.
 const ALIKE: f32 = 0.95;
 /// Side of the regions whose brightness is taken to be one, in pixels.
 const REGION: u32 = 16;
@@ -37,23 +41,40 @@ const STRIP: u32 = 4;
 /// Both are measured as the difference of neighbours on the same kind of surface, relative to the brightness of the region. The tile is
 /// cut into bands, and what is watched in every other of them decides for those between: samples of a pixel depend on one another, as
 /// together they fill the space of numbers evenly, so that none of them may decide for the others. (Before the first of them all that was
-/// watched may.) Which pixels are watched is fixed, and what is watched does not depend on what is shared.
+/// watched may.) Which pixels are watched is fixed, and what is watched does not depend on what is decided: of direct light only the
+/// first sample of each pixel tells, which takes [`LIGHTS`] samples of lights everywhere.
 pub(super) struct Gauge {
     /// For each of [`SIDES`] the variance of a pixel by what is shared, over that by what is not.
     gains: [f64; SIDES.len()],
     rect: Rect,
+    /// Number of the first sample of each pixel.
+    first: u32,
+    /// Whether pixels may share anything.
+    shares: bool,
     /// Of bands of even and of odd number.
     halves: [Half; 2],
     /// For each row the pixel that was watched last.
     last: Vec<Option<Seen>>,
 }
 
+/// What pixels do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Choice {
+    /// Side of the blocks that share, in pixels.
+    pub side: u32,
+    /// Samples of lights at first vertices.
+    pub lights: u32,
+}
+
 /// What was watched in half of the bands.
 #[derive(Clone, Default)]
 struct Half {
     regions: Vec<Region>,
-    samples: f64,
+    /// First samples, their rays, and how many of them have a vertex that takes samples of lights.
+    firsts: f64,
     rays: f64,
+    lit: f64,
+    samples: f64,
     /// Samples that have something to share.
     shared: f64,
 }
@@ -61,11 +82,27 @@ struct Half {
 /// What was watched in a part of the tile.
 #[derive(Clone, Copy, Default)]
 struct Region {
-    samples: f64,
-    brightness: f64,
-    /// Squared differences of what is not shared.
+    /// Of the first samples: their number, their light that is not shared, and pairs of neighbours with the squares of its differences.
+    firsts: f64,
+    own_light: f64,
+    own_pairs: f64,
     own: f64,
-    /// Of what can be shared.
+    /// Relative variance by the edges between other neighbours.
+    edges: f64,
+    /// Variance of what their samples of lights find.
+    direct: f64,
+    /// Of all samples, what can be shared.
+    samples: f64,
+    reflected_light: f64,
+    reflected_pairs: f64,
+    reflected: f64,
+}
+
+/// Variances summed over regions, each relative to its brightness.
+#[derive(Clone, Copy, Default)]
+struct Variances {
+    own: f64,
+    direct: f64,
     reflected: f64,
 }
 
@@ -79,14 +116,16 @@ pub(super) struct Seen {
     /// Normal and albedo of the first surface.
     surface: Option<(Vec3, f32)>,
     /// Rays that it took.
-    pub rays: u64,
+    rays: u64,
+    /// Variance of what its samples of lights find, if the first vertex took several.
+    direct: Option<f32>,
 }
 
 impl Seen {
-    /// A sample whose path has this first vertex.
-    pub fn new(first: Option<&Scattering>, own: Rgb, reflected: Rgb, rays: u64) -> Self {
-        let surface = first.map(|s| (s.normal(), s.albedo().luminance()));
-        Self { own, reflected, surface, rays }
+    /// What came of a path that took so many rays.
+    pub fn new(kept: &Kept, own: Rgb, reflected: Rgb, rays: u64) -> Self {
+        let surface = kept.first.as_ref().map(|(_, s)| (s.normal(), s.albedo().luminance()));
+        Self { own, reflected, surface, rays, direct: kept.scatter }
     }
 
     /// Whether the first surfaces of two should look alike.
@@ -97,14 +136,14 @@ impl Seen {
 }
 
 impl Gauge {
-    /// Of a tile of a picture by this filter.
-    pub fn new(filter: &Filter, rect: Rect) -> Self {
+    /// Of a tile of a picture by this filter whose pixels' first sample is number `first`.
+    pub fn new(filter: &Filter, rect: Rect, first: u32, shares: bool) -> Self {
         let alone = filter.spread_of_blocks(1);
         let gain = |side: u32| filter.spread_of_blocks(side) / (alone * f64::from(side * side));
         let regions = rect.width().div_ceil(REGION) as usize * rect.height().div_ceil(REGION) as usize;
         let half = Half { regions: vec![Region::default(); regions], ..Half::default() };
         let last = vec![None; rect.height() as usize];
-        Self { gains: SIDES.map(gain), rect, halves: [half.clone(), half], last }
+        Self { gains: SIDES.map(gain), rect, first, shares, halves: [half.clone(), half], last }
     }
 
     /// Height of the bands.
@@ -136,7 +175,8 @@ impl Gauge {
     /// Whether sample `index` of the pixels of row `y` is watched.
     pub fn watches(&self, y: u32, index: u32) -> bool {
         let strips = self.band() / STRIP;
-        ((y - self.rect.y0) / STRIP % strips + index).is_multiple_of(WATCHED.min(strips))
+        (self.shares || index == self.first)
+            && ((y - self.rect.y0) / STRIP % strips + index).is_multiple_of(WATCHED.min(strips))
     }
 
     /// Sample `index` of pixel (x, y), if it is one of those that are watched. Pixels of a row come from left to right.
@@ -144,136 +184,112 @@ impl Gauge {
         if !self.watches(y, index) {
             return;
         }
-        let half = self.half(y);
+        let (half, first) = (self.half(y), index == self.first);
         let half = &mut self.halves[half];
-        half.samples += 1.0;
-        half.rays += seen.rays as f64;
-        half.shared += if seen.reflected.is_black() { 0.0 } else { 1.0 };
         let (column, row) = (x - self.rect.x0, y - self.rect.y0);
+        let last = self.last[row as usize].replace(seen).filter(|_| column > 0);
+        let like = last.filter(|last| last.is_like(&seen));
         let region = &mut half.regions[(row / REGION * self.rect.width().div_ceil(REGION) + column / REGION) as usize];
-        let luminance = f64::from((seen.own + seen.reflected).luminance());
-        if !luminance.is_finite() {
+        half.samples += 1.0;
+        half.shared += if seen.reflected.is_black() { 0.0 } else { 1.0 };
+        let square = |a: Rgb, b: Rgb| {
+            let difference = f64::from((a - b).luminance());
+            difference * difference
+        };
+        region.samples += 1.0;
+        region.reflected_light += f64::from(seen.reflected.luminance());
+        if let Some(last) = &like {
+            region.reflected_pairs += 1.0;
+            region.reflected += square(last.reflected, seen.reflected);
+        }
+        if !first {
             return;
         }
-        region.samples += 1.0;
-        region.brightness += luminance;
-        let last = self.last[row as usize].replace(seen);
-        if let Some(last) = last.filter(|last| column > 0 && last.is_like(&seen)) {
-            let own = f64::from((last.own - seen.own).luminance());
-            let reflected = f64::from((last.reflected - seen.reflected).luminance());
-            region.own += own * own;
-            region.reflected += reflected * reflected;
+        half.firsts += 1.0;
+        half.rays += seen.rays as f64;
+        region.firsts += 1.0;
+        region.own_light += f64::from(seen.own.luminance());
+        if let Some(last) = &last {
+            match &like {
+                Some(last) => {
+                    region.own_pairs += 1.0;
+                    region.own += square(last.own, seen.own);
+                }
+                None => region.edges += edge(f64::from(last.own.luminance()), f64::from(seen.own.luminance())),
+            }
+        }
+        if let Some(direct) = seen.direct {
+            half.lit += 1.0;
+            region.direct += f64::from(direct);
         }
     }
 
-    /// The side of blocks for which variance times cost is least in row `y`; `first`: its pixels have no samples yet.
-    pub fn side(&self, y: u32, first: bool) -> u32 {
-        let half = self.half(y);
+    /// What makes variance times cost least for sample `index` of row `y`.
+    pub fn choose(&self, y: u32, index: u32) -> Choice {
+        let (half, first) = (self.half(y), index == self.first);
         let deciding = (0..2).filter(|h| first || *h != half).map(|h| &self.halves[h]);
         let total = |of: fn(&Half) -> f64| deciding.clone().map(of).sum::<f64>();
-        let (samples, rays, shared) = (total(|h| h.samples), total(|h| h.rays), total(|h| h.shared));
-        if samples == 0.0 {
-            return FIRST;
+        let (firsts, samples) = (total(|h| h.firsts), total(|h| h.samples));
+        if firsts == 0.0 {
+            return Choice { side: if self.shares { FIRST } else { 1 }, lights: LIGHTS };
         }
-        let regions = || deciding.clone().flat_map(|h| &h.regions);
-        let floor = FLOOR * regions().map(|r| r.brightness).sum::<f64>() / samples;
-        let sum = |sum: (f64, f64), region: (f64, f64)| (sum.0 + region.0, sum.1 + region.1);
-        let (own, reflected) = regions().map(|r| r.relative(floor)).fold((0.0, 0.0), sum);
-        let work = |(side, gain): (&u32, &f64)| {
-            let joins = if *side > 1 { BUNDLE + JOIN * f64::from(side * side - 1) } else { 0.0 };
-            let cost = samples * SAMPLE + rays + shared * joins;
+        let (rays, lit, shared) = (total(|h| h.rays), total(|h| h.lit), total(|h| h.shared));
+        let floor = FLOOR * deciding.clone().flat_map(|h| &h.regions).map(Region::brightness).sum::<f64>() / firsts;
+        let mut variances = Variances::default();
+        deciding.flat_map(|h| &h.regions).for_each(|region| variances.add(region, floor));
+
+        // The first sample tells of lights: it takes several of them.
+        let fewest = if first { LIGHTS } else { 1 };
+        let sides = SIDES.into_iter().zip(self.gains).filter(|(side, _)| self.shares || *side == 1);
+        let choices = sides.flat_map(|both| (fewest..=LIGHTS).rev().map(move |lights| (both, lights)));
+        let mut best = (f64::INFINITY, Choice { side: 1, lights: LIGHTS });
+        for ((side, gain), lights) in choices {
+            let joins = if side > 1 { BUNDLE + JOIN * f64::from(side * side - 1) } else { 0.0 };
+            let saved = LIGHT * f64::from(LIGHTS - lights) * lit;
+            let cost = SAMPLE + (rays - saved) / firsts + shared / samples * joins;
             // Where nothing has varied yet cost decides.
-            let variance = own + reflected * gain + f64::MIN_POSITIVE.sqrt();
-            cost * variance * if *side > 1 { KEEPING } else { 1.0 }
-        };
-        let works = SIDES.iter().zip(&self.gains).map(|both| (*both.0, work(both)));
-        works.reduce(|best, next| if next.1 < best.1 { next } else { best }).map_or(1, |(side, _)| side)
+            let own = variances.own + variances.direct * (f64::from(LIGHTS) / f64::from(lights) - 1.0);
+            let variance = own + variances.reflected * gain + f64::MIN_POSITIVE.sqrt();
+            let work = cost * variance * if side > 1 { KEEPING } else { 1.0 };
+            if work < best.0 {
+                best = (work, Choice { side, lights });
+            }
+        }
+        best.1
     }
 }
 
 impl Region {
-    /// Its squared differences relative to its brightness, which counts as `floor` at least.
-    fn relative(&self, floor: f64) -> (f64, f64) {
-        let mean = if self.samples > 0.0 { self.brightness / self.samples } else { 0.0 };
-        let level = mean.max(floor);
-        if level > 0.0 { (self.own / (level * level), self.reflected / (level * level)) } else { (0.0, 0.0) }
+    /// Light of all its first samples together.
+    fn brightness(&self) -> f64 {
+        let reflected = if self.samples > 0.0 { self.reflected_light / self.samples } else { 0.0 };
+        self.own_light + reflected * self.firsts
+    }
+}
+
+/// Relative variance of a pixel with an edge somewhere between what these two neighbours show: the mean of p (1 - p) (a - b)^2 over the
+/// part p that one of them covers, by the square of their mean.
+fn edge(a: f64, b: f64) -> f64 {
+    let sum = a + b;
+    if sum > 0.0 { (a - b) * (a - b) / (1.5 * sum * sum) } else { 0.0 }
+}
+
+impl Variances {
+    /// Adds those of a region, as often as it has first samples, relative to its brightness, which counts as `floor` at least.
+    fn add(&mut self, r: &Region, floor: f64) {
+        let level = if r.firsts > 0.0 { (r.brightness() / r.firsts).max(floor) } else { 0.0 };
+        let scale = 1.0 / (level * level);
+        if !(scale > 0.0 && scale.is_finite()) {
+            return;
+        }
+        // Half the squared difference of two samples is the variance of one.
+        let of_pairs =
+            |squares: f64, pairs: f64| if pairs > 0.0 { 0.5 * scale * r.firsts * squares / pairs } else { 0.0 };
+        self.reflected += of_pairs(r.reflected, r.reflected_pairs);
+        self.own += of_pairs(r.own, r.own_pairs) + r.edges;
+        self.direct += scale * r.direct;
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::desc::FilterDesc;
-
-    const TILE: Rect = Rect { x0: 32, y0: 64, x1: 64, y1: 128 };
-
-    /// Shows sample `index` of the pixels of rows `rows`, of which every other one is brighter.
-    fn watch(gauge: &mut Gauge, rows: std::ops::Range<u32>, index: u32, own: f32, reflected: f32) {
-        for y in rows {
-            for x in TILE.x0..TILE.x1 {
-                let odd = ((x + y) % 2) as f32;
-                let surface = Some((Vec3::Y, 0.5));
-                let (own, reflected) = (Rgb::splat(1.0 + own * odd), Rgb::splat(reflected * (odd + 1.0)));
-                gauge.see((x, y), index, Seen { own, reflected, surface, rays: 6 });
-            }
-        }
-    }
-
-    fn gauge() -> Gauge {
-        Gauge::new(&Filter::new(&FilterDesc::Box { radius: 0.5 }, 256, 256), TILE)
-    }
-
-    /// The side after samples of the whole tile.
-    fn side_after(own: f32, reflected: f32) -> u32 {
-        let mut gauge = gauge();
-        watch(&mut gauge, TILE.y0..TILE.y1, 0, own, reflected);
-        gauge.side(TILE.y0, false)
-    }
-
-    #[test]
-    fn blocks_grow_with_what_is_shared() {
-        assert_eq!(gauge().side(TILE.y0, true), FIRST);
-        // Nothing to share, nothing that varies, noise that can't be shared.
-        assert_eq!([side_after(0.5, 0.0), side_after(0.0, 0.0), side_after(0.5, 0.01)], [1, 1, 1]);
-        let sides = [0.1f32, 0.2, 0.5, 2.0].map(|reflected| side_after(0.05, reflected));
-        assert!(sides.windows(2).all(|w| w[0] <= w[1]) && sides[0] > 1 && sides[3] >= 5, "{sides:?}");
-    }
-
-    /// However low the tile, its first sample tells of both halves, so that no band goes on without knowing anything.
-    #[test]
-    fn both_halves_are_watched_from_the_first() {
-        for height in 9..70 {
-            let mut gauge =
-                Gauge::new(&Filter::new(&FilterDesc::Box { radius: 0.5 }, 256, 256), Rect { y1: 64 + height, ..TILE });
-            watch(&mut gauge, 64..64 + height, 0, 0.05, 2.0);
-            assert!(gauge.halves.iter().all(|h| h.samples > 0.0), "{height} rows");
-        }
-    }
-
-    /// With samples a and b of variance V alone and `V / n` shared by n, the best of the sides is that of least cost times variance.
-    #[test]
-    fn the_side_is_the_best_one() {
-        let (own, reflected) = (0.1f64, 0.4);
-        let work = |side: u32| {
-            let n = f64::from(side * side);
-            let (keeping, bundle) = if side > 1 { (KEEPING, BUNDLE) } else { (1.0, 0.0) };
-            (SAMPLE + 6.0 + bundle + JOIN * (n - 1.0)) * (own * own + reflected * reflected / n) * keeping
-        };
-        let best = SIDES.into_iter().min_by(|a, b| work(*a).total_cmp(&work(*b)));
-        assert_eq!(Some(side_after(own as f32, reflected as f32)), best);
-    }
-
-    /// Once a pixel has samples, none of its band has a say in how it goes on.
-    #[test]
-    fn no_band_decides_for_itself() {
-        let mut gauge = gauge();
-        let first_band = TILE.y0..gauge.band_end(TILE.y0);
-        watch(&mut gauge, first_band.clone(), 0, 0.05, 2.0);
-        assert!(gauge.side(first_band.start, true) > 2);
-        assert_eq!(gauge.side(first_band.start, false), FIRST);
-        assert!(gauge.side(first_band.end, false) > 2);
-        let of_others = gauge.band_end(first_band.end);
-        watch(&mut gauge, first_band.end..of_others, 1, 0.5, 0.0);
-        assert_eq!(gauge.side(first_band.start, false), 1);
-    }
-}
+mod tests;

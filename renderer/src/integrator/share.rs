@@ -18,7 +18,7 @@
 mod joints;
 mod kept;
 
-use super::gauge::{Gauge, Seen};
+use super::gauge::{Choice, Gauge, Seen};
 use super::path::Walk;
 use super::tile::Tile;
 use super::{Carried, UnitContext};
@@ -31,10 +31,16 @@ use joints::Joints;
 pub(super) use kept::Kept;
 use std::ops::Range;
 
-/// Whether there may be anything to share.
-pub(super) fn is_of_use(c: &UnitContext<'_>) -> bool {
+/// Whether pixels may have anything to share.
+fn shares(c: &UnitContext<'_>) -> bool {
     let reflects = |m: &Material| matches!(m, Material::Lambert { .. } | Material::Gltf { .. });
-    c.share && c.max_depth > 2 && c.carried == Carried::ALL && c.scene.materials.iter().any(reflects)
+    c.max_depth > 2 && c.carried == Carried::ALL && c.scene.materials.iter().any(reflects)
+}
+
+/// Whether there may be anything to share, or lights of which to take several samples.
+pub(super) fn is_of_use(c: &UnitContext<'_>) -> bool {
+    let splits = || c.max_depth > 1 && c.carried.has(2) && !c.selector.is_empty();
+    c.share && (shares(c) || splits())
 }
 
 /// Renders samples `samples` of each pixel of a tile of a scene without media; `None` when stopped.
@@ -46,15 +52,16 @@ pub(super) fn render(
     counters: &mut Counters,
 ) -> Option<TileSums> {
     let mut tile = Tile::new(c, rect);
-    let mut block = Block { c, lessons, counters, pixels: Vec::new(), joints: Joints::default() };
-    let mut gauge = Gauge::new(&c.view.filter, rect);
+    let mut block = Block { c, lessons, counters, lights: 1, pixels: Vec::new(), joints: Joints::default() };
+    let mut gauge = Gauge::new(&c.view.filter, rect, samples.start, shares(c));
     for index in samples.clone() {
         let mut y = rect.y0;
         while y < rect.y1 {
             if (c.stopped)() {
                 return None;
             }
-            let side = gauge.side(y, index == samples.start);
+            let Choice { side, lights } = gauge.choose(y, index);
+            block.lights = lights;
             let y1 = if side == 1 {
                 let y1 = gauge.strip_end(y);
                 block.render_alone(&mut tile, Rect { y0: y, y1, ..rect }, index, &mut gauge);
@@ -103,6 +110,8 @@ struct Block<'a, 'b> {
     c: &'a UnitContext<'a>,
     lessons: &'b mut LightLessons,
     counters: &'b mut Counters,
+    /// How many samples of lights first vertices take.
+    lights: u32,
     pixels: Vec<Pixel>,
     joints: Joints,
 }
@@ -114,9 +123,8 @@ impl Block<'_, '_> {
         let mut pixels = std::mem::take(&mut self.pixels);
         pixels.resize_with(rect.area(), Pixel::default);
         for (place, pixel) in rect.pixels().zip(&mut pixels) {
-            let (raster, seen) = self.trace(tile, place, index, &mut pixel.kept);
+            let (raster, seen) = self.trace(tile, place, index, &mut pixel.kept, gauge);
             (pixel.place, pixel.raster, pixel.value) = (place, raster, seen.own);
-            gauge.see(place, index, seen);
         }
 
         // Share what the second vertices reflect.
@@ -136,31 +144,39 @@ impl Block<'_, '_> {
         let watched = gauge.watches(rect.y0, index);
         for place in rect.pixels() {
             let (raster, value) = if watched {
-                let (raster, seen) = self.trace(tile, place, index, &mut kept);
-                gauge.see(place, index, seen);
+                let (raster, seen) = self.trace(tile, place, index, &mut kept, gauge);
                 (raster, seen.own + seen.reflected)
             } else {
                 let (raster, s) = tile.sample(place, index);
                 let (c, lessons, counters, kept) = (self.c, &mut *self.lessons, &mut *self.counters, &mut kept);
-                let mut walk = Walk::<_, false, false> { c, lessons, counters, sampler: s.sampler, aov: s.aov, kept };
+                let (sampler, aov, lights) = (s.sampler, s.aov, self.lights);
+                let mut walk = Walk::<false, false> { c, lessons, counters, sampler, aov, lights, kept };
                 (raster, walk.radiance(s.ray))
             };
             tile.add(place, raster, value);
         }
     }
 
-    /// A path that keeps what it may share.
-    fn trace(&mut self, tile: &mut Tile<'_>, place: (u32, u32), index: u32, kept: &mut Kept) -> (Vec2, Seen) {
+    /// A path that keeps what it may share, and is watched if it is one of those that are.
+    fn trace(
+        &mut self,
+        tile: &mut Tile<'_>,
+        place: (u32, u32),
+        index: u32,
+        kept: &mut Kept,
+        gauge: &mut Gauge,
+    ) -> (Vec2, Seen) {
         let rays = self.counters.rays;
         let (raster, s) = tile.sample(place, index);
         let (c, lessons, counters) = (self.c, &mut *self.lessons, &mut *self.counters);
-        let mut walk =
-            Walk::<_, false, true> { c, lessons, counters, sampler: s.sampler, aov: s.aov, kept: &mut *kept };
+        let (sampler, aov, lights) = (s.sampler, s.aov, self.lights);
+        let mut walk = Walk::<false, true> { c, lessons, counters, sampler, aov, lights, kept: &mut *kept };
         let own = walk.radiance(s.ray);
         let reflected = kept.unshared();
         let reflected = if self.counters.admit(reflected) { reflected } else { Rgb::ZERO };
-        let first = kept.first.as_ref().map(|(_, scattering)| scattering);
-        (raster, Seen::new(first, own, reflected, self.counters.rays - rays))
+        let seen = Seen::new(kept, own, reflected, self.counters.rays - rays);
+        gauge.see(place, index, seen);
+        (raster, seen)
     }
 }
 

@@ -45,7 +45,8 @@ pub struct RenderSettings {
     pub replicates: u32,
     /// Whether `path` gives noisy tiles more samples.
     pub adaptive: bool,
-    /// Whether paths of `path` share their second vertices with the pixels around, where that pays.
+    /// Whether paths of `path` share their second vertices with the pixels around, and first vertices take several samples of lights, where
+    /// that pays.
     pub share: bool,
     /// How chains run.
     pub mmlt: MmltOptions,

@@ -24,6 +24,13 @@ impl SobolSampler {
         Self { key, reversed_index: index.reverse_bits(), pair: 0 }
     }
 
+    /// Sample `i` of the `count` that one of this stream is split into: all of them together are as even as the stream itself.
+    #[inline]
+    pub const fn one_of(&self, count: u32, i: u32) -> Self {
+        let index = self.reversed_index.reverse_bits().wrapping_mul(count).wrapping_add(i);
+        Self { reversed_index: index.reverse_bits(), ..*self }
+    }
+
     /// What shuffles the index for the next pair, and two words for its scrambles.
     #[inline]
     fn next_words(&mut self) -> (u32, u32, u32) {
@@ -126,6 +133,16 @@ mod tests {
                 other.next_1d();
             }
             assert_eq!(one, other);
+        }
+    }
+
+    #[test]
+    fn the_parts_of_a_sample_are_samples_of_the_stream() {
+        let stream = |index: u32| SobolSampler::new(3, 1, 17, index);
+        for (index, count) in [(0, 1), (5, 2), (6, 4), (1000, 3)] {
+            for i in 0..count {
+                assert_eq!(stream(index).one_of(count, i), stream(index * count + i));
+            }
         }
     }
 

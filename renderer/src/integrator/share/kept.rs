@@ -14,6 +14,8 @@ pub(in crate::integrator) struct Kept {
     pub departed: Option<(Rgb, f32)>,
     /// The direction of the last light that next-event estimation chose, and its radiance times weight over density.
     pub lit: Option<(Vec3, Rgb)>,
+    /// Of several samples of lights at the first vertex: the variance of what they find together, in luminance.
+    pub scatter: Option<f32>,
     /// The second vertex, if it may be shared.
     pub(super) second: Option<Second>,
 }

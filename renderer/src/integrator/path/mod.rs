@@ -4,18 +4,23 @@
 //! In media, lamps without extent are met in two ways: from where the path scatters, and from points of its flights that are chosen
 //! near the lamp, since what a lamp gives to points chosen without regard to it has no finite variance.
 
+mod lamps;
+mod lights;
+mod split;
+
 use super::share::{self, Kept};
 use super::{UnitContext, tile};
 use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
 use crate::light::LightLessons;
-use crate::math::{Anchor, Ray, Vec2, Vec3};
-use crate::medium::{Channels, Equiangular, passing_probability};
-use crate::path::{MediumPoint, Scattering, power_heuristic, roulette};
-use crate::sampling::{Choice, Sampler};
-use crate::scene::{Enclosures, Event, Target};
+use crate::math::{Anchor, Ray};
+use crate::medium::{Channels, passing_probability};
+use crate::path::{MediumPoint, Scattering, roulette};
+use crate::sampling::{Sampler, SobolSampler};
+use crate::scene::{Enclosures, Event};
 use crate::spectrum::Rgb;
+pub(super) use split::LIGHTS;
 use std::ops::Range;
 
 /// Renders samples `samples` of each pixel of a tile; `None` when stopped. What next-event estimation finds teaches of the lights.
@@ -47,7 +52,7 @@ fn render<const MEDIA: bool>(
     let mut kept = Kept::default();
     tile::render(c, rect, samples, |s| {
         let (lessons, counters, kept) = (&mut *lessons, &mut *counters, &mut kept);
-        Walk::<_, MEDIA, false> { c, lessons, counters, sampler: s.sampler, aov: s.aov, kept }.radiance(s.ray)
+        Walk::<MEDIA, false> { c, lessons, counters, sampler: s.sampler, aov: s.aov, lights: 1, kept }.radiance(s.ray)
     })
 }
 
@@ -63,6 +68,8 @@ struct Arrival {
     pdf: f32,
     /// Whether next-event estimation could not have found the same light: the camera, or a delta lobe.
     alone: bool,
+    /// How many samples of lights the vertex before has taken.
+    lights: u32,
 }
 
 /// A flight before it is made.
@@ -85,17 +92,19 @@ struct Here<'a> {
 }
 
 /// One path, through media or not.
-pub(super) struct Walk<'a, 'b, S, const MEDIA: bool, const SHARE: bool> {
+pub(super) struct Walk<'a, 'b, const MEDIA: bool, const SHARE: bool> {
     pub c: &'a UnitContext<'a>,
     pub lessons: &'b mut LightLessons,
     pub counters: &'b mut Counters,
-    pub sampler: S,
+    pub sampler: SobolSampler,
     pub aov: Option<&'b mut Aov>,
+    /// How many samples of lights its first vertex takes; in media one.
+    pub lights: u32,
     /// Of a path that shares: what it has to share.
     pub kept: &'b mut Kept,
 }
 
-impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SHARE> {
+impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
     /// Radiance that arrives along a camera ray. Of a path that shares it is without what its second vertex reflects.
     pub fn radiance(&mut self, camera_ray: Ray) -> Rgb {
         let scene = self.c.scene;
@@ -109,7 +118,7 @@ impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SH
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
         let lens = Anchor::free(camera_ray.o);
-        let arrival = Arrival { from: lens, pdf: 0.0, alone: true };
+        let arrival = Arrival { from: lens, pdf: 0.0, alone: true, lights: 1 };
         let mut leg = Leg { ray: camera_ray, around: scene.camera_enclosures, tau: Rgb::ZERO, arrival };
         let mut edges = 0;
         while edges < self.c.max_depth {
@@ -166,11 +175,13 @@ impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SH
                 (total, beta) = (Rgb::ZERO, Rgb::ONE);
             }
 
-            // Connect to a light.
-            if !here.scattering.is_delta_only()
-                && self.c.carried.has(edges + 1)
-                && let Some((choice, direct)) = self.next_event(here, &leg)
-            {
+            // Connect to lights.
+            let connects = !here.scattering.is_delta_only() && self.c.carried.has(edges + 1);
+            let lights = if !MEDIA && edges == 1 && connects { self.lights } else { 1 };
+            if lights > 1 {
+                let direct = self.several_lights(here);
+                self.add(&mut total, beta, direct);
+            } else if connects && let Some((choice, direct)) = self.next_event(here, &leg) {
                 self.add(&mut total, beta, direct);
                 self.lessons.gave(choice.index, choice.pmf, prefix * beta * direct);
             } else if SHARE {
@@ -198,7 +209,7 @@ impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SH
             }
             eta_scale *= s.eta * s.eta;
             leg.ray = here.anchor.ray(s.wi);
-            leg.arrival = Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta };
+            leg.arrival = Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta, lights };
             if MEDIA {
                 leg.around = scene.beside(here.object, here.anchor, s.wi, &leg.around);
             }
@@ -259,104 +270,6 @@ impl<S: Sampler, const MEDIA: bool, const SHARE: bool> Walk<'_, '_, S, MEDIA, SH
                 *total += contribution;
             }
         }
-    }
-
-    /// Light of the sky, weighted.
-    fn escaped(&self, ray: &Ray, arrival: &Arrival) -> Rgb {
-        let scene = self.c.scene;
-        let mut sum = Rgb::ZERO;
-        for &i in &scene.infinite_lights {
-            let light = &scene.lights[i as usize];
-            let weight = if arrival.alone {
-                1.0
-            } else {
-                power_heuristic(arrival.pdf, self.c.selector.pmf(i as usize) * light.pdf_li_escaped(ray.d))
-            };
-            sum += light.le_infinite(ray.d) * weight;
-        }
-        sum
-    }
-
-    /// Light of the surface that was hit, weighted.
-    fn emitted(&self, hit: &Interaction, wo: Vec3, arrival: &Arrival) -> Rgb {
-        let Some((index, light)) = self.c.scene.light_at(hit) else { return Rgb::ZERO };
-        let context = self.c.scene.light_context();
-        let radiance = light.radiance(&context, hit, wo);
-        if radiance.is_black() || arrival.alone {
-            return radiance;
-        }
-        let pdf_light = self.c.selector.pmf(index as usize) * light.pdf_li(&context, arrival.from.p, &hit.anchor());
-        radiance * power_heuristic(arrival.pdf, pdf_light)
-    }
-
-    /// Light that comes straight from a chosen light, and the choice.
-    fn next_event(&mut self, here: Here, leg: &Leg) -> Option<(Choice, Rgb)> {
-        let scene = self.c.scene;
-        let (uc, u) = self.sampler.next_3();
-        let choice = self.c.selector.sample(uc)?;
-        self.lessons.tried(choice.index, choice.pmf, 1);
-        let light = &scene.lights[choice.index];
-        let Here { anchor: from, object, scattering } = here;
-        let sample = light.sample_li(&scene.light_context(), from.p, choice.u, u);
-        let li = sample.as_ref()?;
-        let (f, pdf_scattering) = scattering.eval_pdf(li.wi, Transport::Radiance);
-        if f.is_black() {
-            return None;
-        }
-        let cos = scattering.abs_cos(li.wi);
-        let pdf = li.pdf * choice.pmf;
-        let weight = |pdf_scattering: f32| if li.delta { 1.0 } else { power_heuristic(pdf, pdf_scattering) };
-        let weighted = |pdf_scattering: f32| f * li.radiance * (cos * weight(pdf_scattering) / pdf);
-        if MEDIA {
-            let around = scene.beside(object, from, li.wi, &leg.around);
-            let through = scene.transmission(from, &li.into(), around, &mut self.counters.rays)?;
-            let direct = weighted(pdf_scattering * passing_probability(through.tau)) * through.transmittance;
-            return Some((choice, direct * light.position().map_or(1.0, |lamp| not_near_lamp(here, leg, lamp))));
-        }
-        let contribution = weighted(pdf_scattering);
-        if contribution.is_black() {
-            return None;
-        }
-        if SHARE {
-            self.kept.lit = Some((li.wi, li.radiance * (weight(pdf_scattering) / pdf)));
-        }
-        self.counters.rays += 1;
-        (!scene.accel.occluded(&li.shadow_ray(from))).then_some((choice, contribution))
-    }
-
-    /// Light of a lamp without extent that is scattered once into the flight ahead, at a point chosen near the lamp.
-    fn scattered_near_lamp(&mut self, leg: &Leg) -> Option<Rgb> {
-        let scene = self.c.scene;
-        let (uc, u) = (self.sampler.next_1d(), self.sampler.next_1d());
-        let choice = self.c.selector.sample(uc)?;
-        let light = &scene.lights[choice.index];
-        let near = Equiangular::new(leg.ray.o, leg.ray.d, light.position()?)?;
-        let t = near.sample(u);
-        let p = Anchor::free(leg.ray.at(t));
-        let li = light.sample_li(&scene.light_context(), p.p, choice.u, Vec2::ZERO)?;
-
-        // To the point, and on to the lamp.
-        let rays = &mut self.counters.rays;
-        let to = scene.transmission(&leg.arrival.from, &Target::Point(p), leg.around, rays)?;
-        let (_, medium) = scene.medium_in(&to.around).filter(|(_, m)| m.scatters())?;
-        let on = scene.transmission(&p, &(&li).into(), to.around, rays)?;
-
-        let phase = medium.phase.pdf(-leg.ray.d, li.wi);
-        let pdf = near.pdf(t);
-        let weight = power_heuristic(pdf, medium.scatter_density(to.tau));
-        let arriving = medium.sigma_s() * to.transmittance * li.radiance * on.transmittance;
-        Some(arriving * (phase * weight / (pdf * li.pdf * choice.pmf)))
-    }
-}
-
-/// Weight of a point at which a flight was scattered by itself, against its choice near `lamp`.
-fn not_near_lamp(here: Here, leg: &Leg, lamp: Vec3) -> f32 {
-    match (here.scattering, Equiangular::new(leg.ray.o, leg.ray.d, lamp)) {
-        (Scattering::Medium(point), Some(near)) => {
-            let t = (here.anchor.p - leg.ray.o).length();
-            power_heuristic(point.medium.scatter_density(leg.tau), near.pdf(t))
-        }
-        _ => 1.0,
     }
 }
 
