@@ -142,13 +142,15 @@ impl Session<'_> {
     }
 
     fn render(&self, kind: IntegratorKind, max_depth: Option<u32>) -> Result<Rendering, String> {
-        self.task(kind, max_depth, false).run(&self.effort)
+        // Of the others, `mmlt` takes several samples of lights then; the pixels of none share paths.
+        self.task(kind, max_depth, kind != IntegratorKind::Path).run(&self.effort)
     }
 
     fn task(&self, kind: IntegratorKind, max_depth: Option<u32>, share: bool) -> Task<'_> {
         // No two of them share a random number.
         let number = IntegratorKind::ALL.iter().position(|(_, k)| *k == kind).unwrap_or_default() as u64;
-        let number = if share { IntegratorKind::ALL.len() as u64 } else { number };
+        let shared_path = share && kind == IntegratorKind::Path;
+        let number = if shared_path { IntegratorKind::ALL.len() as u64 } else { number };
         Task {
             scene: &self.scene,
             kind,

@@ -17,8 +17,9 @@ pub const MAX_FOOTPRINT: usize = 17;
 #[derive(Clone, Debug)]
 pub struct Filter {
     radius: f32,
-    /// Width of a table cell.
+    /// Width of a table cell, and its inverse.
     step: f32,
+    per_step: f32,
     /// The profile at the cells' borders, from -radius to radius: per pixel, integral 1.
     density: Vec<f32>,
     /// Integral of the profile up to each of the borders.
@@ -82,6 +83,7 @@ impl Filter {
         Self {
             radius,
             step: (step * f64::from(radius)) as f32,
+            per_step: (1.0 / (step * f64::from(radius))) as f32,
             density: profile.iter().map(|d| (d / (total * f64::from(radius))) as f32).collect(),
             cumulative: sums.iter().map(|s| (s / total) as f32).collect(),
             size: [width, height],
@@ -208,7 +210,7 @@ impl Filter {
     /// The table cell that holds `t`, and where in it (0 to 1).
     #[inline]
     fn cell(&self, t: f32) -> (usize, f32) {
-        let x = ((t + self.radius) / self.step).max(0.0);
+        let x = ((t + self.radius) * self.per_step).max(0.0);
         let cell = (x as usize).min(self.density.len() - 2);
         (cell, (x - cell as f32).min(1.0))
     }

@@ -31,6 +31,12 @@ impl SobolSampler {
         Self { reversed_index: index.reverse_bits(), ..*self }
     }
 
+    /// Passes over the numbers of [`Sampler::next_3`].
+    #[inline]
+    pub const fn skip_3(&mut self) {
+        self.pair += 2;
+    }
+
     /// What shuffles the index for the next pair, and two words for its scrambles.
     #[inline]
     fn next_words(&mut self) -> (u32, u32, u32) {
@@ -128,7 +134,10 @@ mod tests {
             let mut one = SobolSampler::new(3, 0, 17, index);
             let mut other = one;
             for _ in 0..4 {
+                let mut skipped = one;
+                skipped.skip_3();
                 assert_eq!(one.next_3(), (other.next_1d(), other.next_2d()));
+                assert_eq!(one, skipped);
                 one.skip_1d();
                 other.next_1d();
             }

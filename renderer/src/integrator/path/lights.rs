@@ -129,7 +129,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
             }
         }
         // The path's own numbers go on as if it had taken one sample.
-        self.sampler.next_3();
+        self.sampler.skip_3();
 
         self.counters.rays += count as u64;
         let (mut sum, mut squares) = (Rgb::ZERO, 0.0);
