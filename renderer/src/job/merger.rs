@@ -86,8 +86,7 @@ impl Merger {
         if self.now.advance(time_up && !tries).is_none() {
             let auto = self.auto.as_mut().filter(|_| tries)?;
             self.first = self.plan.pass + 1;
-            let next = Rendering::new(auto.next_after(&self.settings, &self.now));
-            auto.keep(std::mem::replace(&mut self.now, next));
+            auto.go_on(&self.settings, &mut self.now);
         }
         self.plan = plan_of(&self.now, self.first, self.auto.is_some());
         Some(&self.plan)

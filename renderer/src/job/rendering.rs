@@ -97,6 +97,19 @@ impl Rendering {
         }
     }
 
+    /// A render that begins with what samples of others have taught of the lights ([`Rendering::light_sums`]).
+    pub fn knowing(settings: RenderSettings, light_sums: &[f64]) -> Self {
+        let mut new = Self::new(settings);
+        new.plan.light_weights = selection_weights(light_sums);
+        new.light_sums = light_sums.to_vec();
+        new
+    }
+
+    /// What samples have taught of the lights; empty where there is no choice.
+    pub fn light_sums(&self) -> &[f64] {
+        &self.light_sums
+    }
+
     /// The job's settings.
     pub fn settings(&self) -> &RenderSettings {
         &self.settings

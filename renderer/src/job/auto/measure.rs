@@ -7,6 +7,12 @@ use crate::job::rendering::Rendering;
 const FLOOR: f64 = 0.01;
 /// Side of the blocks that are compared, in pixels of the small film.
 const BLOCK: usize = 4;
+/// Parts of a picture along each axis, in each of which light may be missing.
+const PARTS: usize = 8;
+/// How much less than independent samples those of a pixel scatter at most, as they are even; as observed with many lights.
+const EVEN: f64 = 4.0;
+/// Standard errors by which there must be more: a single bright sample can be all of a second moment.
+const SURE: f64 = 2.0;
 /// Squared standard errors beyond which a block is darker for a reason: light that was not found.
 const CERTAIN: f64 = 16.0;
 
@@ -90,15 +96,35 @@ impl Sample {
         sum / (3 * self.width * self.height) as f64
     }
 
-    /// Mean relative variance of what this picture tells the second moment of, beyond the square of the mean that others tell.
-    pub fn relative_moment(&self, weights: &Weights, mean: [&Self; 2]) -> f64 {
-        let of = |i: usize| {
-            let (moment, a, b) = (self.mean(i), mean[0].mean(i), mean[1].mean(i));
-            let excess = |c: usize| moment[c] - 0.25 * (a[c] + b[c]) * (a[c] + b[c]);
-            (0..3).map(|c| weights.pixels[i][c] * excess(c)).sum::<f64>()
+    /// Relative variance of one sample that `alone`, a trial of `samples` in each pixel of a group, does not show: of what this picture tells
+    /// the second moment of, beyond the square of the mean that both `mean` tell, times the filter's `spread`, what is more in a part of the
+    /// picture than even samples explain. Samples that are even over a pixel scatter less than independent ones, which the moment is that of.
+    pub fn relative_excess(&self, weights: &Weights, mean: [&Self; 2], spread: f64, alone: &Self, samples: f64) -> f64 {
+        let relative = |i: usize, of: [f64; 3]| (0..3).map(|c| weights.pixels[i][c] * of[c]).sum::<f64>() / 3.0;
+        let square = |i: usize| {
+            let (a, b) = (mean[0].mean(i), mean[1].mean(i));
+            std::array::from_fn(|c| 0.25 * (a[c] + b[c]) * (a[c] + b[c]))
         };
-        let pixels = self.width * self.height;
-        (0..pixels).map(of).sum::<f64>() / (3 * pixels) as f64
+        let part_of = |i: usize| i / self.width * PARTS / self.height * PARTS + i % self.width * PARTS / self.width;
+        // What is known but for what even samples explain, as each group tells it.
+        let told: Vec<[f64; PARTS * PARTS]> = (self.groups.iter())
+            .map(|group| {
+                let mut parts = [0.0; PARTS * PARTS];
+                for (i, moment) in group.iter().enumerate() {
+                    let at = weights.at(i % self.width, i / self.width, self.width, self.height);
+                    let known = spread * (relative(i, *moment) - relative(i, square(i)));
+                    parts[part_of(i)] += known - EVEN * samples * relative(at, alone.variance(at));
+                }
+                parts
+            })
+            .collect();
+        let excess = |part: usize| {
+            let n = told.len().max(1) as f64;
+            let mean = told.iter().map(|parts| parts[part]).sum::<f64>() / n;
+            let squares: f64 = told.iter().map(|parts| (parts[part] - mean) * (parts[part] - mean)).sum();
+            (mean - SURE * (squares / (n * (n - 1.0).max(1.0))).sqrt()).max(0.0)
+        };
+        (0..PARTS * PARTS).map(excess).sum::<f64>() / (self.width * self.height) as f64
     }
 
     /// Relative variance of one sample for each of `samples` in a pixel that light must at least have which `full` shows and this trial

@@ -5,6 +5,9 @@
 //! is the relative error that an integrator would leave for the same work: the variance between a trial's replicate groups, times the
 //! rays and samples that it took.
 //!
+//! What lights are worth selecting every render learns from its first samples. Trials are too short for that: where there is a choice, the
+//! first of them is rendered again, and it and all others begin with what it has taught.
+//!
 //! A short trial of `path` can miss light altogether, such as a caustic, and look clean. So its picture is compared with that of `bdpt`,
 //! block by block: light that n samples have not found has a probability of at most about 1 / n, which bounds its variance from below.
 
@@ -53,6 +56,8 @@ const MARGIN: f64 = 1.3;
 enum Tried {
     /// By `path`.
     Path,
+    /// The same, knowing the lights.
+    Again,
     /// By `path` whose pixels share nothing, to be compared with what it would find seldom.
     Alone,
     /// By `bdpt`.
@@ -68,7 +73,7 @@ enum Tried {
 impl Tried {
     fn integrator(self) -> IntegratorKind {
         match self {
-            Self::Path | Self::Alone | Self::Direct => IntegratorKind::Path,
+            Self::Path | Self::Again | Self::Alone | Self::Direct => IntegratorKind::Path,
             Self::Bdpt => IntegratorKind::Bdpt,
             Self::Moments => IntegratorKind::Moments,
             Self::Mmlt => IntegratorKind::Mmlt,
@@ -116,7 +121,17 @@ pub struct Auto {
     trials: Vec<Rendering>,
     /// What they met.
     met: Counters,
+    /// What the first trial has taught of the lights, and the work that it took: it is not among those above.
+    lights: Option<Lights>,
     choice: Option<Choice>,
+}
+
+/// What a trial has taught of the lights.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Lights {
+    /// Bits of the numbers, see [`Rendering::light_sums`].
+    sums: Vec<u64>,
+    work: f64,
 }
 
 impl Auto {
@@ -140,22 +155,18 @@ impl Auto {
         job.rendered_by(IntegratorKind::Path, job.budget.spp)
     }
 
-    /// The settings of the render after a trial.
-    pub fn next_after(&mut self, job: &RenderSettings, trial_done: &Rendering) -> RenderSettings {
-        self.met.add(&trial_done.counters());
-        let trials: Vec<&Rendering> = self.trials.iter().chain([trial_done]).collect();
-        let outcomes = outcomes(&trials);
-        let easy = trials.len() == WITHOUT_CHAINS && outcomes.iter().any(|o| o.cost() < EASY);
-        if trials.len() < TRIED.len() && !easy {
-            return trial(job, TRIED[trials.len()]);
+    /// Puts the next render in the place of a trial, which is kept for what it can be compared with; once there is a choice, none is needed.
+    pub fn go_on(&mut self, job: &RenderSettings, now: &mut Rendering) {
+        self.met.add(&now.counters());
+        if self.lights.is_none() && self.trials.is_empty() && !now.light_sums().is_empty() {
+            let work = work_of(&now.spent().samples, IntegratorKind::Path);
+            let sums = now.light_sums().iter().map(|v| v.to_bits()).collect();
+            self.lights = Some(Lights { sums, work });
+            *now = self.begin(trial(job, Tried::Again));
+            return;
         }
-        let (choice, settings) = choose(job, &trials, outcomes);
-        self.choice = Some(choice);
-        settings
-    }
-
-    /// Keeps a trial for what it can be compared with; once there is a choice, none is needed.
-    pub fn keep(&mut self, trial: Rendering) {
+        let next = self.settings_after(job, now);
+        let trial = std::mem::replace(now, self.begin(next));
         if self.choice.is_some() {
             self.trials.clear();
         } else {
@@ -163,10 +174,35 @@ impl Auto {
         }
     }
 
+    /// Begins a trial, which knows the lights, or the render that was chosen, which learns of them by itself.
+    fn begin(&self, settings: RenderSettings) -> Rendering {
+        match &self.lights {
+            Some(lights) if self.choice.is_none() => {
+                let sums: Vec<f64> = lights.sums.iter().map(|v| f64::from_bits(*v)).collect();
+                Rendering::knowing(settings, &sums)
+            }
+            _ => Rendering::new(settings),
+        }
+    }
+
+    /// The settings of the render after a trial that is compared with others.
+    fn settings_after(&mut self, job: &RenderSettings, trial_done: &Rendering) -> RenderSettings {
+        let trials: Vec<&Rendering> = self.trials.iter().chain([trial_done]).collect();
+        let outcomes = outcomes(&trials);
+        let easy = trials.len() == WITHOUT_CHAINS && outcomes.iter().any(|o| o.cost() < EASY);
+        if trials.len() < TRIED.len() && !easy {
+            return trial(job, TRIED[trials.len()]);
+        }
+        let learning = self.lights.as_ref().map_or(0.0, |lights| lights.work);
+        let (choice, settings) = choose(job, &trials, outcomes, learning);
+        self.choice = Some(choice);
+        settings
+    }
+
     /// Appends the whole state.
     pub fn save(&self, out: &mut Vec<u8>) -> io::Result<()> {
         // Plain structs of numbers and names always serialise.
-        let head = serde_json::to_vec(&(&self.choice, self.met)).unwrap_or_default();
+        let head = serde_json::to_vec(&(&self.choice, self.met, &self.lights)).unwrap_or_default();
         out.extend((head.len() as u64).to_le_bytes());
         out.write_all(&head)?;
         out.extend((self.trials.len() as u64).to_le_bytes());
@@ -182,13 +218,13 @@ impl Auto {
     /// Takes what [`Auto::save`] wrote off the front; `None` when it is not that.
     pub fn load(r: &mut Reader) -> Option<Self> {
         let n = r.length()?;
-        let (choice, met) = serde_json::from_slice(r.take(n)?).ok()?;
+        let (choice, met, lights) = serde_json::from_slice(r.take(n)?).ok()?;
         let mut trials = Vec::new();
         for _ in 0..r.length().filter(|n| *n <= TRIED.len())? {
             let n = r.length()?;
             trials.push(Rendering::load(r.take(n)?)?);
         }
-        Some(Self { trials, met, choice })
+        Some(Self { trials, met, lights, choice })
     }
 }
 
@@ -252,11 +288,14 @@ fn outcomes(trials: &[&Rendering]) -> Vec<Outcome> {
     let seen = path_sample.relative_variance(&weights, false) * of_group(path);
     let s = path.settings();
     let spread = Filter::new(&s.filter, s.width, s.height).spread();
-    let known = spread * Sample::new(moments, Part::Whole).relative_moment(&weights, [&path_sample, &bdpt_sample]);
-    let seen_alone = Sample::new(alone, Part::Whole).relative_variance(&weights, false) * of_group(alone);
+    let alone_sample = Sample::new(alone, Part::Whole);
+    let seen_alone = alone_sample.relative_variance(&weights, false) * of_group(alone);
+    let moments = Sample::new(moments, Part::Whole);
+    let means = [&path_sample, &bdpt_sample];
+    let excess = moments.relative_excess(&weights, means, spread, &alone_sample, of_group(alone));
     // What sharing takes from the noise that is seen it takes from that which is not, as far as is known.
     let left = if seen_alone > 0.0 { (seen / seen_alone).min(1.0) } else { 1.0 };
-    let unseen = left * (known - seen_alone).max(0.0) + path_sample.unseen(&bdpt_sample, f64::from(path.done_spp()));
+    let unseen = left * excess + path_sample.unseen(&bdpt_sample, f64::from(path.done_spp()));
     let own = |r: &Rendering, kind| each(&r.spent().samples, kind) / unit;
     let mut outcomes = vec![
         Outcome { integrator: IntegratorKind::Path, variance: seen + unseen, unseen, work: 1.0 },
@@ -303,8 +342,13 @@ fn work_of(c: &Counters, kind: IntegratorKind) -> f64 {
     ray * c.rays as f64
 }
 
-/// The choice and the settings of the render.
-fn choose(job: &RenderSettings, trials: &[&Rendering], outcomes: Vec<Outcome>) -> (Choice, RenderSettings) {
+/// The choice and the settings of the render; `learning` is the work that went into knowing the lights.
+fn choose(
+    job: &RenderSettings,
+    trials: &[&Rendering],
+    outcomes: Vec<Outcome>,
+    learning: f64,
+) -> (Choice, RenderSettings) {
     let finite = |o: &&Outcome| o.cost().is_finite();
     let handicap = |o: &Outcome| o.cost() * if o.integrator == IntegratorKind::Mmlt { MARGIN } else { 1.0 };
     let best = outcomes.iter().filter(finite).min_by(|a, b| handicap(a).total_cmp(&handicap(b)));
@@ -318,8 +362,8 @@ fn choose(job: &RenderSettings, trials: &[&Rendering], outcomes: Vec<Outcome>) -
             + work_of(&s.chains, kind(r))
     };
     let path = &trials[0].spent().samples;
-    let spent: f64 =
-        trials.iter().map(spent_on).sum::<f64>() / (work_of(path, IntegratorKind::Path) / path.samples as f64);
+    let spent: f64 = (learning + trials.iter().map(spent_on).sum::<f64>())
+        / (work_of(path, IntegratorKind::Path) / path.samples as f64);
     // `--spp` is what path would take: the trials come off it, and the rest is worth so many of the chosen one's samples.
     let count = job.budget.spp.map(|n| {
         let left = (f64::from(n) - spent / job.pixels()).max(0.0);
