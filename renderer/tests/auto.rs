@@ -8,7 +8,7 @@ use common::{build, camera, emission, lambert, shape};
 use renderer::bsdf::Material;
 use renderer::film::MergedImage;
 use renderer::integrator::IntegratorKind;
-use renderer::job::{Merger, RenderOptions, RenderSettings, Stop, run_unit};
+use renderer::job::{Merger, PassPlan, RenderOptions, RenderSettings, Stop, run_unit};
 use renderer::math::{DAffine3, DVec3};
 use renderer::scene::Scene;
 use renderer::scene::desc::{FilterDesc, LightDesc, SceneDesc, ShapeKind};
@@ -50,6 +50,17 @@ fn open() -> Scene {
     plate_under(vec![ball], vec![LightDesc::Constant { radiance: Rgb::new(0.4, 0.5, 0.6) }])
 }
 
+/// A lamp over the plate, and one below it that is a thousand times stronger, of which nothing is seen.
+fn hidden() -> Scene {
+    let lamp = |at: f64, radiance: f32| {
+        let place = DAffine3::from_scale_rotation_translation(DVec3::splat(0.3), Default::default(), DVec3::Y * at);
+        let mut lamp = shape(ShapeKind::Sphere, place, 0);
+        lamp.emission = emission(radiance);
+        lamp
+    };
+    plate_under(vec![lamp(3.0, 10.0), lamp(-3.0, 1e4)], Vec::new())
+}
+
 fn settings(scene: &Scene, options: RenderOptions) -> RenderSettings {
     let options = RenderOptions { size: Some((96, 64)), max_depth: Some(6), ..options };
     RenderSettings::resolve(&options, &scene.defaults).unwrap()
@@ -57,9 +68,15 @@ fn settings(scene: &Scene, options: RenderOptions) -> RenderSettings {
 
 /// Renders a job; after each pass, the merger is written and read again, if asked to.
 fn run(scene: &Scene, settings: &RenderSettings, reload: bool) -> Merger {
+    run_watched(scene, settings, reload, &mut |_| {})
+}
+
+/// The same, showing the plan of every pass.
+fn run_watched(scene: &Scene, settings: &RenderSettings, reload: bool, watch: &mut dyn FnMut(&PassPlan)) -> Merger {
     let mut merger = Merger::new(settings.clone());
     loop {
         let plan = merger.plan().clone();
+        watch(&plan);
         for id in 0..plan.unit_count() {
             let unit = plan.unit(id).unwrap();
             merger.fold(id, &run_unit(scene, settings, &plan, &unit, &Stop::new()).unwrap()).unwrap();
@@ -99,11 +116,31 @@ fn easy_scenes_are_left_to_path() {
     assert!(choice.share.unwrap() < 0.35, "{choice:?}");
 }
 
+/// Every render learns which lights are worth selecting; trials, which are too short for it, begin with what the first of them has learned.
+#[test]
+fn trials_know_the_lights() {
+    let scene = hidden();
+    // The first pass of each render: who renders, and how the lights are weighed.
+    let mut begins = Vec::new();
+    let s = settings(&scene, RenderOptions::counting(IntegratorKind::Auto, 64));
+    let merger = run_watched(&scene, &s, false, &mut |plan| {
+        if plan.own_pass() == 0 {
+            begins.push((plan.settings(&s).integrator, plan.light_weights.clone()));
+        }
+    });
+    let (first, rest) = begins.split_first().unwrap();
+    let (last, trials) = rest.split_last().unwrap();
+    assert!(first.1.is_empty() && last.1.is_empty(), "{first:?} {last:?}");
+    assert_eq!(trials[0].0, IntegratorKind::Path);
+    assert!(trials.len() >= 4 && trials.iter().all(|(_, w)| w.len() == 2 && w[0] > 0.99), "{trials:?}");
+    assert_eq!(merger.choice().unwrap().trials.len(), if trials.len() > 4 { 3 } else { 2 });
+}
+
 /// The same decisions and bits when the merge is written to disk and read again in every trial and every pass; and the image is that of
 /// a job by the integrator itself.
 #[test]
 fn nothing_of_the_trials_is_in_the_image() {
-    for scene in [caustic(), open()] {
+    for scene in [caustic(), open(), hidden()] {
         let s = settings(&scene, RenderOptions::counting(IntegratorKind::Auto, 40));
         let (straight, reloaded) = (run(&scene, &s, false), run(&scene, &s, true));
         assert_eq!(straight.choice(), reloaded.choice());
