@@ -118,7 +118,7 @@ pub(super) struct Seen {
     /// Rays that it took.
     rays: u64,
     /// Variance of what its samples of lights find, if the first vertex took several.
-    direct: Option<f32>,
+    direct: Option<f64>,
 }
 
 impl Seen {
@@ -220,7 +220,7 @@ impl Gauge {
         }
         if let Some(direct) = seen.direct {
             half.lit += 1.0;
-            region.direct += f64::from(direct);
+            region.direct += direct;
         }
     }
 

@@ -13,7 +13,7 @@ fn watch_lit(
     gauge: &mut Gauge,
     rows: std::ops::Range<u32>,
     index: u32,
-    (own, direct): (f32, Option<f32>),
+    (own, direct): (f32, Option<f64>),
     reflected: f32,
 ) {
     for y in rows {
@@ -77,11 +77,11 @@ fn the_side_is_the_best_one() {
 #[test]
 fn lights_are_sampled_as_often_as_it_pays() {
     // Every other pixel is brighter by d: the variance is d^2 / 2 at two samples of lights; half of what they scatter more at one.
-    for (own, direct) in [(0.5f32, 0.0f32), (0.5, 0.01), (0.5, 0.05), (0.5, 0.12)] {
+    for (own, direct) in [(0.5f32, 0.0f64), (0.5, 0.01), (0.5, 0.05), (0.5, 0.12)] {
         let mut gauge = gauge_of(TILE, false);
         watch_lit(&mut gauge, TILE.y0..TILE.y1, 0, (own, Some(direct)), 0.0);
-        let pays =
-            0.5 * own * own * (SAMPLE + 6.0) as f32 <= (0.5 * own * own + direct) * (SAMPLE + 6.0 - LIGHT) as f32;
+        let variance = 0.5 * f64::from(own) * f64::from(own);
+        let pays = variance * (SAMPLE + 6.0) <= (variance + direct) * (SAMPLE + 6.0 - LIGHT);
         let lights = if pays { LIGHTS } else { 1 };
         assert_eq!(gauge.choose(TILE.y0, 1), Choice { side: 1, lights }, "{direct}");
         assert_eq!(gauge.choose(TILE.y0, 0).lights, LIGHTS);

@@ -132,17 +132,18 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
         self.sampler.skip_3();
 
         self.counters.rays += count as u64;
-        let (mut sum, mut squares) = (Rgb::ZERO, 0.0);
+        // Radiance may be as large as single precision has it; its square may not.
+        let (mut sum, mut squares) = (Rgb::ZERO, 0.0f64);
         for ((choice, value), hidden) in open[..count].iter().zip(self.c.scene.accel.occluded_each(&rays[..count])) {
             if !hidden && self.counters.admit(*value) {
                 sum += *value;
-                squares += value.luminance() * value.luminance();
+                squares += f64::from(value.luminance()) * f64::from(value.luminance());
                 self.lessons.gave(choice.index, choice.pmf, *value);
             }
         }
         if SHARE {
             // Variance of their sum, from the squared differences of all pairs.
-            let (n, total) = (self.lights as f32, sum.luminance());
+            let (n, total) = (f64::from(self.lights), f64::from(sum.luminance()));
             self.kept.scatter = Some((n * squares - total * total).max(0.0) / (n - 1.0));
         }
         sum

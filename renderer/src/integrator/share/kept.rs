@@ -15,7 +15,7 @@ pub(in crate::integrator) struct Kept {
     /// The direction of the last light that next-event estimation chose, and its radiance times weight over density.
     pub lit: Option<(Vec3, Rgb)>,
     /// Of several samples of lights at the first vertex: the variance of what they find together, in luminance.
-    pub scatter: Option<f32>,
+    pub scatter: Option<f64>,
     /// The second vertex, if it may be shared.
     pub(super) second: Option<Second>,
 }
