@@ -209,14 +209,11 @@ impl Gauge {
         half.rays += seen.rays as f64;
         region.firsts += 1.0;
         region.own_light += f64::from(seen.own.luminance());
-        if let Some(last) = &last {
-            match &like {
-                Some(last) => {
-                    region.own_pairs += 1.0;
-                    region.own += square(last.own, seen.own);
-                }
-                None => region.edges += edge(f64::from(last.own.luminance()), f64::from(seen.own.luminance())),
-            }
+        if let Some(last) = &like {
+            region.own_pairs += 1.0;
+            region.own += square(last.own, seen.own);
+        } else if let Some(last) = &last {
+            region.edges += edge(f64::from(last.own.luminance()), f64::from(seen.own.luminance()));
         }
         if let Some(direct) = seen.direct {
             half.lit += 1.0;
