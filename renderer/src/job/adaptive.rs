@@ -55,16 +55,35 @@ fn ranges(own: &TiledFilm, others: &[&TiledFilm], total: u32) -> Vec<[u32; 2]> {
     let budget: f64 = areas.iter().zip(&done).map(|(area, done)| area * (f64::from(total) - done)).sum();
     let level = level(&wanted, &done, &areas, budget);
 
-    // Round, and hand on what rounding leaves to the next tile.
+    // Round, and hand on what rounding leaves to the next tile that needs some; the last one takes the rest.
+    let needs: Vec<f64> = wanted.iter().zip(&done).map(|(wanted, done)| (level * wanted - done).max(0.0)).collect();
+    let last = needs.iter().rposition(|n| *n > 0.0);
     let mut left = 0.0;
-    let range = |(t, area): (u32, &f64)| {
-        let t = t as usize;
-        let pixels = (level * wanted[t] - done[t]).max(0.0) * area + left;
-        let n = (pixels / area).floor().max(0.0);
-        left = pixels - n * area;
-        [done[t] as u32, (done[t] + n) as u32]
+    let range = |t: usize| {
+        let most = done[t] + needs[t] + left / areas[t];
+        let upto = match needs[t] > 0.0 {
+            true if last == Some(t) => f64::max(most.floor(), done[t]),
+            true => rounded(done[t], most),
+            false => done[t],
+        };
+        left += (done[t] + needs[t] - upto) * areas[t];
+        [done[t] as u32, upto as u32]
     };
-    (0..).zip(&areas).map(range).collect()
+    (0..areas.len()).map(range).collect()
+}
+
+/// The largest number of samples not above `upto` of those that a tile may have after `done`: powers of two and what lies half-way between
+/// them, since samples fill the space of numbers most evenly then, and what a tile's first samples teach of its paths is used by many.
+fn rounded(done: f64, upto: f64) -> f64 {
+    let (mut n, mut next, mut step) = (done, 1.0, 1.0);
+    while next <= upto {
+        n = f64::max(n, next);
+        // 1, 2, 3, 4, 6, 8, 12, 16, ...
+        let twice = next >= 4.0 * step;
+        step *= if twice { 2.0 } else { 1.0 };
+        next += step;
+    }
+    n
 }
 
 /// What a tile should have of the samples, up to a factor: the noise of one sample over the square root of what a sample costs (Neyman
@@ -115,4 +134,18 @@ fn level(wanted: &[f64], done: &[f64], areas: &[f64], budget: f64) -> f64 {
 /// The dealing of a pass.
 pub fn dealing(settings: &RenderSettings, ranges: Vec<Vec<[u32; 2]>>) -> Option<Dealing> {
     settings.adapts().then(|| Dealing { grid: TileGrid::of_film(settings.width, settings.height), ranges })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded;
+
+    #[test]
+    fn samples_end_at_powers_of_two_and_half_way_between() {
+        let mut ends: Vec<f64> = (0..=100).map(|upto| rounded(0.0, f64::from(upto))).collect();
+        ends.dedup();
+        assert_eq!(ends, [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0]);
+        // What a tile has stays where the next number is out of reach.
+        assert_eq!([rounded(5.0, 5.9), rounded(5.0, 6.0), rounded(70.0, 95.9)], [5.0, 6.0, 70.0]);
+    }
 }

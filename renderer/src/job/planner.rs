@@ -89,15 +89,32 @@ impl Planner {
     /// what was found, all groups get as many as soon as that is believed.
     pub fn size(&self, done: u32) -> u32 {
         let left = self.settings.budget.spp.map_or(MAX_SPP, |n| n.min(MAX_SPP)).saturating_sub(done);
-        let (size, g) = (pass_size(&self.settings, done, left), self.settings.replicates);
-        let whole = self.settings.adapts() && done >= adaptive::PILOT * g && size > 0;
-        if whole { (done + size).next_multiple_of(g) - done } else { size }
+        let g = self.settings.replicates;
+        if !self.settings.adapts() {
+            return pass_size(&self.settings, done, left);
+        }
+        // A tile's samples should come together: what pixels share is found out anew in each pass. Before them one sample learns of lights.
+        let pilot = adaptive::PILOT * g;
+        let counted = self.is_counted();
+        if done < pilot {
+            let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
+            let most = if counted { pilot } else { (PASS_SAMPLES / pixels).clamp(1, u64::from(pilot)) as u32 };
+            let size = if done == 0 { 1 } else { most };
+            return if size > g { size / g * g } else { size }.min(left).min(pilot - done);
+        }
+        let size = if counted { (done / 2).min(left) } else { pass_size(&self.settings, done, left) };
+        if size > 0 { (done + size).next_multiple_of(g) - done } else { 0 }
+    }
+
+    /// Whether nothing but the number of samples ends the job.
+    fn is_counted(&self) -> bool {
+        let b = &self.settings.budget;
+        b.spp.is_some() && b.time_s.is_none() && b.target_error.is_none()
     }
 
     /// The samples per pixel of a job that nothing but their number ends, and that goes to all pixels alike.
     fn sample_budget(&self) -> Option<u32> {
-        let b = &self.settings.budget;
-        b.spp.filter(|_| b.time_s.is_none() && b.target_error.is_none() && !self.settings.adapts())
+        self.settings.budget.spp.filter(|_| self.is_counted() && !self.settings.adapts())
     }
 
     /// Whether the first pass is a pilot of whole groups.
