@@ -222,13 +222,18 @@ fn shared_paths_make_the_same_image_with_less_noise() {
     assert!(gain > 2.0, "variance is only {gain} times less");
 }
 
-/// Several samples of lights at first vertices, without anything to share and with it.
+/// Several samples of lights at first vertices, where these are worth their rays, without anything to share and with it.
 #[test]
 fn several_samples_of_lights_make_the_same_image_with_less_noise() {
     let scene = lamps();
     let direct = |share| RenderOptions { max_depth: Some(2), ..path(24, share) };
-    let gain = gain(&compared(&scene, [direct(true), direct(false)]));
-    assert!(gain > 1.2, "variance is only {gain} times less");
+    let both = compared(&scene, [direct(true), direct(false)]);
+    let gain = gain(&both);
+    // A sample costs about a ray beside its rays.
+    let work =
+        |renders: &Vec<MergedImage>| -> u64 { renders.iter().map(|r| r.counters.samples + r.counters.rays).sum() };
+    let dearer = work(&both[0]) as f64 / work(&both[1]) as f64;
+    assert!(gain > 1.1 && gain > dearer, "variance is only {gain} times less, for {dearer} times the work");
     compared(&scene, [path(24, true), path(24, false)]);
 }
 

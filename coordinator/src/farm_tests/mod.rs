@@ -30,7 +30,7 @@ fn whatever_happens_every_unit_is_stored_once_and_the_jobs_end() {
             assert_eq!(units.len(), world.total(*id));
         }
         let last = plans(&settings(kind, side)).last().unwrap().unit_count();
-        assert_eq!((world.total(job_id(1)), world.total(job_id(2))), (144, last));
+        assert_eq!((world.total(job_id(1)), world.total(job_id(2))), (288, last));
         fired.iter_mut().zip(world.fired).for_each(|(sum, n)| *sum += n);
     }
     assert!(fired.iter().all(|n| *n > 150), "some faults hardly happened: {fired:?}");

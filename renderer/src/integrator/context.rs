@@ -1,6 +1,7 @@
+use super::gauge::{Choice, Lesson};
 use crate::camera::Camera;
 use crate::film::{Counters, Filter};
-use crate::light::LightSelector;
+use crate::light::{LightLessons, LightSelector};
 use crate::math::{Ray, Vec2};
 use crate::path::Tracer;
 use crate::path::mis::Heuristic;
@@ -62,6 +63,7 @@ impl<'a> UnitContext<'a> {
             rr_depth: u32::MAX,
             threshold: 0.0,
             share: false,
+            begin: None,
             selector: &scene.selector,
             stopped: &|| false,
         }
@@ -112,8 +114,19 @@ pub struct UnitContext<'a> {
     pub threshold: f32,
     /// Whether paths of pixels may share their second vertices.
     pub share: bool,
+    /// How pixels begin to share, as other samples have taught.
+    pub begin: Option<Choice>,
     /// Chooses lights: by power, or as the plan says.
     pub selector: &'a LightSelector,
     /// Whether the unit should end without a result.
     pub stopped: &'a dyn Fn() -> bool,
+}
+
+/// What the samples of a unit teach those of later passes.
+#[derive(Debug)]
+pub struct Lessons {
+    /// Which lights are worth selecting.
+    pub lights: LightLessons,
+    /// What pixels gain by sharing, if they may.
+    pub sharing: Option<Lesson>,
 }

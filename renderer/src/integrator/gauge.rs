@@ -1,29 +1,17 @@
 //! How large the blocks of pixels should be that share their paths ([`super::share`]), and how many samples of lights their first vertices
 //! should take.
 
+mod lesson;
+
 use super::path::LIGHTS;
 use super::share::Kept;
 use crate::film::{Filter, Rect};
 use crate::math::Vec3;
 use crate::spectrum::Rgb;
+pub use lesson::{Choice, Gains, JOIN_RAY, Lesson};
 
-/// Sides of blocks, in pixels; the largest first, which is best where it costs nothing.
-const SIDES: [u32; 7] = [8, 6, 5, 4, 3, 2, 1];
 /// Side of blocks before anything is known.
 const FIRST: u32 = 2;
-/// What it costs to try a join, over a ray of a path with what is computed where it arrives; about half of them take a shadow ray, among
-/// others to the same point. As counted in instructions.
-const JOIN: f64 = 0.2;
-/// What all joins of a second vertex cost together, however many: the tree is walked for all of them.
-const BUNDLE: f64 = 2.3;
-/// What a join's shadow ray costs, all of this included.
-pub const JOIN_RAY: f64 = 0.4;
-/// What each further sample of a light costs, its ray included, in the same unit; as timed.
-const LIGHT: f64 = 0.9;
-/// What a sample costs beside its rays, in the same unit: numbers, camera ray, film.
-const SAMPLE: f64 = 1.0;
-/// So much must be gained at least: it costs something to keep what may be shared, and what is gained is a guess.
-const KEEPING: f64 = 1.1;
 /// Neighbours are alike if their normals have at least this cosine, and their albedos are as near to each other: what is
 /// reflected to others differs by more than noise.
 const ALIKE: f32 = 0.95;
@@ -44,26 +32,18 @@ const STRIP: u32 = 4;
 /// watched may.) Which pixels are watched is fixed, and what is watched does not depend on what is decided: of direct light only the
 /// first sample of each pixel tells, which takes [`LIGHTS`] samples of lights everywhere.
 pub(super) struct Gauge {
-    /// For each of [`SIDES`] the variance of a pixel by what is shared, over that by what is not.
-    gains: [f64; SIDES.len()],
+    gains: Gains,
     rect: Rect,
     /// Number of the first sample of each pixel.
     first: u32,
     /// Whether pixels may share anything.
     shares: bool,
+    /// What other samples say the first should do.
+    begin: Option<Choice>,
     /// Of bands of even and of odd number.
     halves: [Half; 2],
     /// For each row the pixel that was watched last.
     last: Vec<Option<Seen>>,
-}
-
-/// What pixels do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Choice {
-    /// Side of the blocks that share, in pixels.
-    pub side: u32,
-    /// Samples of lights at first vertices.
-    pub lights: u32,
 }
 
 /// What was watched in half of the bands.
@@ -98,14 +78,6 @@ struct Region {
     reflected: f64,
 }
 
-/// Variances summed over regions, each relative to its brightness.
-#[derive(Clone, Copy, Default)]
-struct Variances {
-    own: f64,
-    direct: f64,
-    reflected: f64,
-}
-
 /// A sample.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
@@ -136,14 +108,13 @@ impl Seen {
 }
 
 impl Gauge {
-    /// Of a tile of a picture by this filter whose pixels' first sample is number `first`.
-    pub fn new(filter: &Filter, rect: Rect, first: u32, shares: bool) -> Self {
-        let alone = filter.spread_of_blocks(1);
-        let gain = |side: u32| filter.spread_of_blocks(side) / (alone * f64::from(side * side));
+    /// Of a tile of a picture by this filter whose pixels' first sample is number `first`; `begin` is what samples of others say it
+    /// should do.
+    pub fn new(filter: &Filter, rect: Rect, first: u32, shares: bool, begin: Option<Choice>) -> Self {
         let regions = rect.width().div_ceil(REGION) as usize * rect.height().div_ceil(REGION) as usize;
         let half = Half { regions: vec![Region::default(); regions], ..Half::default() };
         let last = vec![None; rect.height() as usize];
-        Self { gains: SIDES.map(gain), rect, first, shares, halves: [half.clone(), half], last }
+        Self { gains: Gains::of(filter), rect, first, shares, begin, halves: [half.clone(), half], last }
     }
 
     /// Height of the bands.
@@ -223,36 +194,42 @@ impl Gauge {
 
     /// What makes variance times cost least for sample `index` of row `y`.
     pub fn choose(&self, y: u32, index: u32) -> Choice {
-        let (half, first) = (self.half(y), index == self.first);
-        let deciding = (0..2).filter(|h| first || *h != half).map(|h| &self.halves[h]);
-        let total = |of: fn(&Half) -> f64| deciding.clone().map(of).sum::<f64>();
-        let (firsts, samples) = (total(|h| h.firsts), total(|h| h.samples));
-        if firsts == 0.0 {
-            return Choice { side: if self.shares { FIRST } else { 1 }, lights: LIGHTS };
+        let first = index == self.first;
+        if let Some(begin) = self.begin.filter(|_| first) {
+            return Choice { side: if self.shares { begin.side } else { 1 }, ..begin };
         }
-        let (rays, lit, shared) = (total(|h| h.rays), total(|h| h.lit), total(|h| h.shared));
-        let floor = FLOOR * deciding.clone().flat_map(|h| &h.regions).map(Region::brightness).sum::<f64>() / firsts;
-        let mut variances = Variances::default();
-        deciding.flat_map(|h| &h.regions).for_each(|region| variances.add(region, floor));
-
+        let half = self.half(y);
+        let lesson = Self::lesson_of((0..2).filter(|h| first || *h != half).map(|h| &self.halves[h]));
         // The first sample tells of lights: it takes several of them.
         let fewest = if first { LIGHTS } else { 1 };
-        let sides = SIDES.into_iter().zip(self.gains).filter(|(side, _)| self.shares || *side == 1);
-        let choices = sides.flat_map(|both| (fewest..=LIGHTS).rev().map(move |lights| (both, lights)));
-        let mut best = (f64::INFINITY, Choice { side: 1, lights: LIGHTS });
-        for ((side, gain), lights) in choices {
-            let joins = if side > 1 { BUNDLE + JOIN * f64::from(side * side - 1) } else { 0.0 };
-            let saved = LIGHT * f64::from(LIGHTS - lights) * lit;
-            let cost = SAMPLE + (rays - saved) / firsts + shared / samples * joins;
-            // Where nothing has varied yet cost decides.
-            let own = variances.own + variances.direct * (f64::from(LIGHTS) / f64::from(lights) - 1.0);
-            let variance = own + variances.reflected * gain + f64::MIN_POSITIVE.sqrt();
-            let work = cost * variance * if side > 1 { KEEPING } else { 1.0 };
-            if work < best.0 {
-                best = (work, Choice { side, lights });
-            }
-        }
-        best.1
+        let unknown = Choice { side: if self.shares { FIRST } else { 1 }, lights: LIGHTS };
+        lesson.choose(&self.gains, self.shares, fewest).unwrap_or(unknown)
+    }
+
+    /// How many samples of lights a pixel of row `y` takes for sample `index` where `lights` were chosen.
+    pub fn lights(&self, y: u32, index: u32, lights: u32) -> u32 {
+        if index == self.first && self.watches(y, index) { LIGHTS } else { lights }
+    }
+
+    /// What all that was watched teaches.
+    pub fn lesson(&self) -> Lesson {
+        Self::lesson_of(self.halves.iter())
+    }
+
+    fn lesson_of<'a>(halves: impl Iterator<Item = &'a Half> + Clone) -> Lesson {
+        let total = |of: fn(&Half) -> f64| halves.clone().map(of).sum::<f64>();
+        let mut lesson = Lesson {
+            firsts: total(|h| h.firsts),
+            rays: total(|h| h.rays),
+            lit: total(|h| h.lit),
+            samples: total(|h| h.samples),
+            shared: total(|h| h.shared),
+            ..Lesson::default()
+        };
+        let regions = || halves.clone().flat_map(|h| &h.regions);
+        let floor = FLOOR * regions().map(Region::brightness).sum::<f64>() / lesson.firsts;
+        regions().for_each(|region| region.teach(&mut lesson, floor));
+        lesson
     }
 }
 
@@ -262,6 +239,21 @@ impl Region {
         let reflected = if self.samples > 0.0 { self.reflected_light / self.samples } else { 0.0 };
         self.own_light + reflected * self.firsts
     }
+
+    /// Adds its variances, as often as it has first samples, relative to its brightness, which counts as `floor` at least.
+    fn teach(&self, lesson: &mut Lesson, floor: f64) {
+        let level = if self.firsts > 0.0 { (self.brightness() / self.firsts).max(floor) } else { 0.0 };
+        let scale = 1.0 / (level * level);
+        if !(scale > 0.0 && scale.is_finite()) {
+            return;
+        }
+        // Half the squared difference of two samples is the variance of one.
+        let of_pairs =
+            |squares: f64, pairs: f64| if pairs > 0.0 { 0.5 * scale * self.firsts * squares / pairs } else { 0.0 };
+        lesson.reflected += of_pairs(self.reflected, self.reflected_pairs);
+        lesson.own += of_pairs(self.own, self.own_pairs) + self.edges;
+        lesson.direct += scale * self.direct;
+    }
 }
 
 /// Relative variance of a pixel with an edge somewhere between what these two neighbours show: the mean of p (1 - p) (a - b)^2 over the
@@ -269,23 +261,6 @@ impl Region {
 fn edge(a: f64, b: f64) -> f64 {
     let sum = a + b;
     if sum > 0.0 { (a - b) * (a - b) / (1.5 * sum * sum) } else { 0.0 }
-}
-
-impl Variances {
-    /// Adds those of a region, as often as it has first samples, relative to its brightness, which counts as `floor` at least.
-    fn add(&mut self, r: &Region, floor: f64) {
-        let level = if r.firsts > 0.0 { (r.brightness() / r.firsts).max(floor) } else { 0.0 };
-        let scale = 1.0 / (level * level);
-        if !(scale > 0.0 && scale.is_finite()) {
-            return;
-        }
-        // Half the squared difference of two samples is the variance of one.
-        let of_pairs =
-            |squares: f64, pairs: f64| if pairs > 0.0 { 0.5 * scale * r.firsts * squares / pairs } else { 0.0 };
-        self.reflected += of_pairs(r.reflected, r.reflected_pairs);
-        self.own += of_pairs(r.own, r.own_pairs) + r.edges;
-        self.direct += scale * r.direct;
-    }
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ mod share;
 pub mod strategies;
 mod tile;
 
-pub use context::{Carried, UnitContext, View};
-pub use gauge::JOIN_RAY;
+pub use context::{Carried, Lessons, UnitContext, View};
+pub use gauge::{Choice, Gains, JOIN_RAY, Lesson};
 
 use serde::{Deserialize, Serialize};
 

@@ -21,7 +21,7 @@ mod kept;
 use super::gauge::{Choice, Gauge, Seen};
 use super::path::Walk;
 use super::tile::Tile;
-use super::{Carried, UnitContext};
+use super::{Carried, Lessons, UnitContext};
 use crate::bsdf::Material;
 use crate::film::{Counters, Rect, TileSums};
 use crate::light::LightLessons;
@@ -48,12 +48,13 @@ pub(super) fn render(
     c: &UnitContext<'_>,
     rect: Rect,
     samples: Range<u32>,
-    lessons: &mut LightLessons,
+    lessons: &mut Lessons,
     counters: &mut Counters,
 ) -> Option<TileSums> {
     let mut tile = Tile::new(c, rect);
-    let mut block = Block { c, lessons, counters, lights: 1, pixels: Vec::new(), joints: Joints::default() };
-    let mut gauge = Gauge::new(&c.view.filter, rect, samples.start, shares(c));
+    let lights = &mut lessons.lights;
+    let mut block = Block { c, lessons: lights, counters, lights: 1, pixels: Vec::new(), joints: Joints::default() };
+    let mut gauge = Gauge::new(&c.view.filter, rect, samples.start, shares(c), c.begin);
     for index in samples.clone() {
         let mut y = rect.y0;
         while y < rect.y1 {
@@ -80,6 +81,7 @@ pub(super) fn render(
             y = y1;
         }
     }
+    lessons.sharing = Some(gauge.lesson());
     Some(tile.finish(samples.end - samples.start))
 }
 
@@ -169,7 +171,7 @@ impl Block<'_, '_> {
         let rays = self.counters.rays;
         let (raster, s) = tile.sample(place, index);
         let (c, lessons, counters) = (self.c, &mut *self.lessons, &mut *self.counters);
-        let (sampler, aov, lights) = (s.sampler, s.aov, self.lights);
+        let (sampler, aov, lights) = (s.sampler, s.aov, gauge.lights(place.1, index, self.lights));
         let mut walk = Walk::<false, true> { c, lessons, counters, sampler, aov, lights, kept: &mut *kept };
         let own = walk.radiance(s.ray);
         let reflected = kept.unshared();

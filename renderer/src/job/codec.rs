@@ -4,11 +4,12 @@ use super::bytes::Reader;
 use super::plan::PassPlan;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Aov, BLOCK, Counters, SplatSums, TileSums};
+use crate::integrator::Lesson;
 use crate::integrator::mmlt::{BootstrapSums, ChainStats, Found};
 use crate::spectrum::Rgb;
 use std::ops::Range;
 
-const MAGIC: &[u8; 4] = b"LFU3";
+const MAGIC: &[u8; 4] = b"LFU4";
 const BLOCK_FLOATS: usize = (BLOCK * BLOCK) as usize * 3;
 /// Edges of the longest path that chains carry, at most.
 const MAX_EDGES: u32 = 255;
@@ -36,6 +37,8 @@ impl UnitResult {
         }
         head.extend((self.light_sums.len() as u32).to_le_bytes());
         self.light_sums.iter().for_each(|v| head.extend(v.to_le_bytes()));
+        head.push(u8::from(self.sharing.is_some()));
+        self.sharing.iter().flat_map(Lesson::numbers).for_each(|v| head.extend(v.to_le_bytes()));
         encode_chains(self, &mut head);
         let mut blocks: Vec<u32> = Vec::new();
         let mut floats: Vec<f32> = Vec::new();
@@ -91,6 +94,7 @@ impl UnitResult {
         if light_sums.iter().any(|v| !(v.is_finite() && *v >= 0.0)) {
             return Err(fail("a light's sum is not a finite, non-negative number"));
         }
+        let sharing = decode_sharing(&mut r).map_err(fail)?;
         let splats = r.take(1).ok_or(fail("too short"))? == [1];
         let (bootstrap, chains) = decode_chains(&mut r, unit)?;
         let empty = SplatSums::new(width, height);
@@ -110,7 +114,7 @@ impl UnitResult {
             return Err(fail("a sum is not finite"));
         }
         let (tile, splatted) = floats.split_at(of_tile);
-        let mut result = Self { paths, light_sums, bootstrap, chains, counters, ..Self::default() };
+        let mut result = Self { paths, light_sums, sharing, bootstrap, chains, counters, ..Self::default() };
         if let UnitKind::Tile { rect, covered, start, end } = &unit.kind {
             let (sums, rest) = tile.split_at(covered.area() * 3);
             let (weights, aovs) = rest.split_at(covered.area());
@@ -142,6 +146,19 @@ fn of_tile(unit: &Unit) -> usize {
         }
         UnitKind::Paths { .. } | UnitKind::Bootstrap { .. } | UnitKind::Chains { .. } => 0,
     }
+}
+
+/// Reads what the samples teach of sharing.
+fn decode_sharing(r: &mut Reader) -> Result<Option<Lesson>, &'static str> {
+    const SHORT: &str = "too short";
+    if r.take(1).ok_or(SHORT)? != [1] {
+        return Ok(None);
+    }
+    let mut numbers = [0.0; Lesson::NUMBERS];
+    for to in &mut numbers {
+        *to = f64::from_bits(r.u64().ok_or(SHORT)?);
+    }
+    Lesson::of_numbers(numbers).map(Some).ok_or("what is taught of sharing is no finite, non-negative number")
 }
 
 /// What bootstrap and chain units have beside sums.

@@ -13,6 +13,7 @@ mod planner;
 mod rendering;
 mod run;
 mod settings;
+mod sharing;
 mod skips;
 mod unit;
 

@@ -139,6 +139,9 @@ pub struct PassPlan {
     pub parts: Vec<Part>,
     /// Plan constant: selection weights of the lights, learned from earlier passes; empty = by power.
     pub light_weights: Vec<f32>,
+    /// Plan constant: how pixels begin to share paths in each cell of 128 x 128, row by row, learned from earlier passes: side of blocks
+    /// and samples of lights, for groups of even number and for those of odd number; zeros = not known. Empty = nowhere.
+    pub sharing: Vec<[[u8; 2]; 2]>,
     /// Plan constant: contributions of connections below this are tested for visibility by chance only.
     pub threshold: f32,
     /// Plan constant of Metropolis jobs.

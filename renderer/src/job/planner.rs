@@ -32,6 +32,9 @@ pub fn dealt(settings: &RenderSettings, total: u32, group: u32) -> u32 {
     total / g + u32::from(group < total % g)
 }
 
+/// Groups that begin with a sample per pixel, of which all others learn: one of even number and one of odd number.
+const TEACHERS: u32 = 2;
+
 /// Makes the passes of a job, one after the other.
 #[derive(Clone, Debug)]
 pub struct Planner {
@@ -47,7 +50,7 @@ impl Planner {
     /// The first pass: small, so that there is a preview (and a pilot) soon.
     ///
     /// A budget in samples is worked off group after group, so that few films are open at once. Its first pass is one sample per pixel
-    /// of the first group; a tracer from the lights, which learns from its pilot, does an eighth of its groups first.
+    /// of the first two groups; a tracer from the lights, which learns from its pilot, does an eighth of its groups first.
     pub fn first(&self) -> PassPlan {
         if self.settings.integrator == IntegratorKind::Mmlt {
             return metropolis::pilot(&self.settings);
@@ -56,12 +59,10 @@ impl Planner {
             return self.pass(0, 0, self.size(0), Learned::default());
         };
         let groups = self.shares(spp);
-        let first = if self.learns_first() {
+        let first: Vec<GroupRange> = if self.learns_first() {
             groups[..(groups.len() / 8).max(1)].to_vec()
-        } else if groups[0].end > 1 {
-            vec![GroupRange { end: 1, closes: false, ..groups[0] }]
         } else {
-            groups.clone()
+            groups.iter().take(TEACHERS as usize).map(|g| GroupRange { end: 1, closes: g.end == 1, ..*g }).collect()
         };
         let last = first == groups;
         self.plan(0, first, Learned::default(), last)
@@ -75,9 +76,8 @@ impl Planner {
             let rest = if self.learns_first() {
                 groups[(groups.len() / 8).max(1)..].to_vec()
             } else {
-                let mut rest = groups;
-                rest[0].start = 1;
-                rest
+                let rest = (0..).zip(groups).map(|(i, g)| GroupRange { start: u32::from(i < TEACHERS), ..g });
+                rest.filter(|g| g.start < g.end).collect()
             };
             return (pass == 1).then(|| self.plan(pass, rest, learned, true));
         }
@@ -90,17 +90,19 @@ impl Planner {
     pub fn size(&self, done: u32) -> u32 {
         let left = self.settings.budget.spp.map_or(MAX_SPP, |n| n.min(MAX_SPP)).saturating_sub(done);
         let g = self.settings.replicates;
+        if done == 0 && self.settings.integrator == IntegratorKind::Path {
+            return g.min(TEACHERS).min(left);
+        }
         if !self.settings.adapts() {
             return pass_size(&self.settings, done, left);
         }
-        // A tile's samples should come together: what pixels share is found out anew in each pass. Before them one sample learns of lights.
+        // A tile's samples should come together: what each of them shares is found out better then.
         let pilot = adaptive::PILOT * g;
         let counted = self.is_counted();
         if done < pilot {
             let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
             let most = if counted { pilot } else { (PASS_SAMPLES / pixels).clamp(1, u64::from(pilot)) as u32 };
-            let size = if done == 0 { 1 } else { most };
-            return if size > g { size / g * g } else { size }.min(left).min(pilot - done);
+            return if most > g { most / g * g } else { most }.min(left).min(pilot - done);
         }
         let size = if counted { (done / 2).min(left) } else { pass_size(&self.settings, done, left) };
         if size > 0 { (done + size).next_multiple_of(g) - done } else { 0 }
@@ -160,6 +162,7 @@ impl Planner {
             dealing: adaptive::dealing(&self.settings, learned.ranges.unwrap_or_default()),
             parts: groups.into_iter().map(Part::Samples).collect(),
             light_weights: learned.light_weights,
+            sharing: learned.sharing,
             threshold: learned.threshold,
             chains: None,
             chain_weight: 0,
@@ -175,6 +178,8 @@ impl Planner {
 pub struct Learned {
     /// Selection weights of the lights; empty = by power.
     pub light_weights: Vec<f32>,
+    /// How pixels begin to share: see [`PassPlan::sharing`].
+    pub sharing: Vec<[[u8; 2]; 2]>,
     /// Contributions of connections below this are tested for visibility by chance only.
     pub threshold: f32,
     /// Where samples go by what was found: see [`Dealing::ranges`](super::Dealing::ranges). `None` = to all pixels alike.

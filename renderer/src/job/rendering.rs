@@ -4,10 +4,11 @@ use super::metropolis::Metropolis;
 use super::plan::{Part, PassPlan, Sampling};
 use super::planner::{CHECKPOINT_SAMPLES, Learned, Planner};
 use super::settings::RenderSettings;
+use super::sharing::Sharing;
 use super::unit::{UnitKind, UnitResult};
 use crate::film::{AovSum, Counters, GroupFilm, MergedImage, SplatSums};
-use crate::integrator::IntegratorKind;
 use crate::integrator::mmlt::ChainStats;
+use crate::integrator::{IntegratorKind, Lesson};
 use crate::light::selection_weights;
 use std::io::{self, Write};
 
@@ -44,6 +45,7 @@ pub struct Rendering {
     groups: Vec<GroupFilm>,
     aovs: Vec<AovSum>,
     light_sums: Vec<f64>,
+    sharing: Sharing,
     /// What a Metropolis job has learned.
     metropolis: Metropolis,
     chain_stats: ChainStats,
@@ -89,6 +91,7 @@ impl Rendering {
             groups,
             aovs: Vec::new(),
             light_sums: Vec::new(),
+            sharing: Sharing::default(),
             metropolis: Metropolis::default(),
             chain_stats: ChainStats::default(),
             spent: Spent::default(),
@@ -190,6 +193,9 @@ impl Rendering {
                     group.add_splats(splats, rect.area() as u64 * u64::from(tile.samples));
                 }
                 self.add_aovs(tile);
+                if let Some(lesson) = &result.sharing {
+                    self.sharing.add(&self.settings, rect, unit.replicate, lesson);
+                }
             }
             (UnitKind::Paths { start, end }, None, Some(splats)) if fits(splats) && result.paths == end - start => {
                 group.add_splats(splats, result.paths);
@@ -262,6 +268,7 @@ impl Rendering {
         let share = self.planner.size(self.done_spp) / self.settings.replicates;
         let learned = Learned {
             light_weights: selection_weights(&self.light_sums),
+            sharing: self.sharing.choices(&self.settings),
             threshold: self.learned_threshold(),
             ranges: adaptive::deal(&self.settings, &self.groups, self.done_spp, share),
         };
@@ -349,6 +356,7 @@ impl Rendering {
             next: self.next,
             done_spp: self.done_spp,
             light_sums: self.light_sums.iter().map(|v| v.to_bits()).collect(),
+            sharing: self.sharing.to_bits(),
             chain_stats: self.chain_stats,
             spent: self.spent,
             checkpoints_met: self.checkpoints_met,
@@ -408,6 +416,7 @@ impl Rendering {
             groups,
             aovs,
             light_sums: head.light_sums.into_iter().map(f64::from_bits).collect(),
+            sharing: Sharing::of_bits(&head.sharing)?,
             metropolis,
             chain_stats: head.chain_stats,
             spent: head.spent,
@@ -425,6 +434,7 @@ struct Head {
     next: u32,
     done_spp: u32,
     light_sums: Vec<u64>,
+    sharing: Vec<[u64; Lesson::NUMBERS]>,
     chain_stats: ChainStats,
     spent: Spent,
     checkpoints_met: u32,

@@ -1,11 +1,12 @@
 use super::metropolis;
 use super::plan::{Part, PassPlan, Sampling};
 use super::settings::RenderSettings;
+use super::sharing;
 use super::unit::{Unit, UnitKind, UnitResult};
 use crate::film::{Rect, SplatSums};
 use crate::integrator::mmlt::{self, ChainTask, Mismatch};
 use crate::integrator::strategies::{self, Strategies};
-use crate::integrator::{self, Carried, IntegratorKind, UnitContext, View};
+use crate::integrator::{self, Carried, IntegratorKind, Lessons, UnitContext, View};
 use crate::light::LightLessons;
 use crate::scene::Scene;
 use std::ops::Range;
@@ -102,6 +103,7 @@ fn run(
         rr_depth: settings.rr_depth,
         threshold: plan.threshold,
         share: settings.share,
+        begin: sharing::begin(plan, unit),
         selector: learned.as_ref().unwrap_or(&scene.selector),
         stopped: &|| stop.stopped(),
     };
@@ -112,7 +114,8 @@ fn run(
         UnitKind::Bootstrap { .. } => pass == 0,
         UnitKind::Chains { .. } => false,
     };
-    let mut lessons = if learns { LightLessons::new(scene.lights.len()) } else { LightLessons::default() };
+    let lights = if learns { LightLessons::new(scene.lights.len()) } else { LightLessons::default() };
+    let mut lessons = Lessons { lights, sharing: None };
     let done = match unit.kind {
         UnitKind::Tile { rect, start, end, .. } => {
             run_tile(&context, (plan, settings.integrator), (rect, start..end), &mut lessons, &mut result)
@@ -120,7 +123,7 @@ fn run(
         UnitKind::Paths { start, end } => {
             let mut splats = SplatSums::new(settings.width, settings.height);
             let counters = &mut result.counters;
-            let done = integrator::light::trace_paths(&context, start..end, &mut splats, &mut lessons, counters);
+            let done = integrator::light::trace_paths(&context, start..end, &mut splats, &mut lessons.lights, counters);
             result.paths = end - start;
             result.splats = Some(splats);
             done
@@ -129,7 +132,8 @@ fn run(
             let Some(constants) = &plan.chains else { return Ok(None) };
             // The pilot's samples are a preview.
             let mut splats = (pass == 0).then(|| SplatSums::new(settings.width, settings.height));
-            let pool = mmlt::PoolTask { pass, samples: start..end, splats: splats.as_mut(), lessons: &mut lessons };
+            let pool =
+                mmlt::PoolTask { pass, samples: start..end, splats: splats.as_mut(), lessons: &mut lessons.lights };
             result.bootstrap = mmlt::run_bootstrap(&context, constants, &settings.mmlt, pool, &mut result.counters);
             result.splats = splats;
             result.bootstrap.is_some()
@@ -154,7 +158,8 @@ fn run(
     if let Some(splats) = &mut result.splats {
         splats.round();
     }
-    result.light_sums = lessons.into_sums();
+    result.light_sums = lessons.lights.into_sums();
+    result.sharing = lessons.sharing.filter(|_| learns);
     Ok(done.then_some(result))
 }
 
@@ -199,7 +204,7 @@ fn run_tile(
     c: &UnitContext<'_>,
     (plan, integrator): (&PassPlan, IntegratorKind),
     (rect, samples): (Rect, Range<u32>),
-    lessons: &mut LightLessons,
+    lessons: &mut Lessons,
     result: &mut UnitResult,
 ) -> bool {
     let counters = &mut result.counters;
@@ -209,7 +214,7 @@ fn run_tile(
         result.tile = if integrator == IntegratorKind::Moments {
             integrator::moments::render_tile(c, rect, samples, &mut splats, counters)
         } else {
-            integrator::bdpt::render_tile(c, rect, samples, &mut splats, lessons, counters)
+            integrator::bdpt::render_tile(c, rect, samples, &mut splats, &mut lessons.lights, counters)
         };
         result.splats = Some(splats);
     } else {

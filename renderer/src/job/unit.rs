@@ -1,4 +1,5 @@
 use crate::film::{Counters, Rect, SplatSums, TileSums};
+use crate::integrator::Lesson;
 use crate::integrator::mmlt::{BootstrapSums, ChainStats};
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +68,8 @@ pub struct UnitResult {
     pub paths: u64,
     /// What the next pass's selection weights come from: see `integrator::light::selection_weights`. Empty for tiles.
     pub light_sums: Vec<f64>,
+    /// What its samples teach of sharing paths.
+    pub sharing: Option<Lesson>,
     /// What a bootstrap unit found.
     pub bootstrap: Option<BootstrapSums>,
     /// How the mutations of chains fared.

@@ -1,3 +1,4 @@
+use super::lesson::{BUNDLE, JOIN, KEEPING, LIGHT, SAMPLE, SIDES};
 use super::*;
 use crate::scene::desc::FilterDesc;
 
@@ -31,7 +32,7 @@ fn gauge() -> Gauge {
 }
 
 fn gauge_of(tile: Rect, shares: bool) -> Gauge {
-    Gauge::new(&Filter::new(&FilterDesc::Box { radius: 0.5 }, 256, 256), tile, 0, shares)
+    Gauge::new(&Filter::new(&FilterDesc::Box { radius: 0.5 }, 256, 256), tile, 0, shares, None)
 }
 
 /// The side after samples of the whole tile.

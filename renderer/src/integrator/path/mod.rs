@@ -9,7 +9,7 @@ mod lights;
 mod split;
 
 use super::share::{self, Kept};
-use super::{UnitContext, tile};
+use super::{Lessons, UnitContext, tile};
 use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
@@ -23,22 +23,23 @@ use crate::spectrum::Rgb;
 pub(super) use split::LIGHTS;
 use std::ops::Range;
 
-/// Renders samples `samples` of each pixel of a tile; `None` when stopped. What next-event estimation finds teaches of the lights.
+/// Renders samples `samples` of each pixel of a tile; `None` when stopped. What is found teaches of the lights, and of
+/// what pixels gain by sharing.
 pub fn render_tile(
     c: &UnitContext<'_>,
     rect: Rect,
     samples: Range<u32>,
-    lessons: &mut LightLessons,
+    lessons: &mut Lessons,
     counters: &mut Counters,
 ) -> Option<TileSums> {
     counters.samples += rect.area() as u64 * u64::from(samples.end - samples.start);
     // Which of the two it is is decided once for the tile: scenes without media run no code for them.
     if c.scene.features.has_media() {
-        render::<true>(c, rect, samples, lessons, counters)
+        render::<true>(c, rect, samples, &mut lessons.lights, counters)
     } else if share::is_of_use(c) {
         share::render(c, rect, samples, lessons, counters)
     } else {
-        render::<false>(c, rect, samples, lessons, counters)
+        render::<false>(c, rect, samples, &mut lessons.lights, counters)
     }
 }
 

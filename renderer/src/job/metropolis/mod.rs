@@ -135,6 +135,7 @@ fn plan(
         dealing: None,
         parts,
         light_weights: Vec::new(),
+        sharing: Vec::new(),
         threshold: 0.0,
         chains: Some(chains),
         chain_weight,
