@@ -30,7 +30,7 @@ pub struct RenderArgs {
     /// Stop when the upper 95 % bound of the relative error is below this, such as 0.02
     #[arg(long, value_name = "X", value_parser = positive)]
     pub target_error: Option<f64>,
-    /// Give noisy tiles more samples and quiet ones fewer (path) [default: true with --target-error]
+    /// Give noisy tiles more samples and quiet ones fewer (path) [default: true with --target-error and with --time]
     #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true")]
     pub adaptive: Option<bool>,
     /// Share paths between the pixels of small blocks where that pays (path): less noise, alike in neighbours [default: true]

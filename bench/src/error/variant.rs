@@ -89,10 +89,16 @@ impl Variant {
             return Ok(options);
         }
         options.spp = budget.spp;
-        match self.tuning.first() {
-            Some(t) => Err(format!("{}: the integrator {} has no option {:?}", self.name, self.kind.name(), t.key)),
-            None => Ok(options),
+        for t in &self.tuning {
+            let to = match (self.kind, t.key.as_str()) {
+                (IntegratorKind::Path | IntegratorKind::Auto, "adaptive") => &mut options.adaptive,
+                (IntegratorKind::Path, "share") => &mut options.share,
+                (kind, key) => return Err(format!("{}: the integrator {} has no option {key:?}", self.name, kind.name())),
+            };
+            let value = t.value.as_deref().unwrap_or("true").parse();
+            *to = Some(value.map_err(|_| format!("{}: {} is true or false", self.name, t.key))?);
         }
+        Ok(options)
     }
 }
 
@@ -125,5 +131,15 @@ mod tests {
         assert_eq!(spp("path"), Some(8));
         assert_eq!(spp("path:spp=2"), Some(2));
         assert_eq!(spp("path:time=2"), None);
+    }
+    #[test]
+    fn path_has_switches() {
+        let options = |text: &str| text.parse::<Variant>().unwrap().render_options(Budget::default());
+        let o = options("path:adaptive,share=false,spp=64").unwrap();
+        assert_eq!((o.adaptive, o.share, o.spp), (Some(true), Some(false), Some(64)));
+        assert_eq!(options("path").unwrap().adaptive, None);
+        for wrong in ["path:adaptive=often", "bdpt:adaptive", "light:share"] {
+            assert!(options(wrong).is_err(), "{wrong}");
+        }
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 /// The least side of a tile of [`TileGrid`].
 const LEAST_SIDE: u32 = 32;
 /// Tiles that a film is cut into at most.
-const MOST_TILES: u64 = 4096;
+const MOST_TILES: u64 = 1024;
 
 /// A film cut into square tiles of one size, numbered row by row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,7 +16,7 @@ pub struct TileGrid {
 }
 
 impl TileGrid {
-    /// Of a film of `width * height` pixels: at most 4096 tiles, of 32 pixels a side or more.
+    /// Of a film of `width * height` pixels: at most 1024 tiles, of 32 pixels a side or more.
     pub fn of_film(width: u32, height: u32) -> Self {
         let grid = |side| Self { width, height, side };
         let sides = std::iter::successors(Some(LEAST_SIDE), |s| s.checked_mul(2));

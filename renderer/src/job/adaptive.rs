@@ -10,7 +10,7 @@ use super::settings::RenderSettings;
 use crate::film::{GroupFilm, TileGrid, TiledFilm};
 
 /// Samples of a pixel that each group has before its noise is believed.
-pub const PILOT: u32 = 4;
+pub const PILOT: u32 = 2;
 /// Share of the samples that goes to all pixels alike: what seems quiet may not have been found yet.
 const UNIFORM_SHARE: f64 = 0.2;
 /// Keeps relative errors from dividing by the darkness of black pixels, as in the error that is told.

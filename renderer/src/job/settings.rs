@@ -152,7 +152,7 @@ impl RenderSettings {
             rr_depth: scene.rr_depth.unwrap_or(5),
             seed: options.seed.or(scene.seed).unwrap_or(0),
             replicates: groups(integrator, &budget),
-            adaptive: options.adaptive.unwrap_or(budget.target_error.is_some()),
+            adaptive: options.adaptive.unwrap_or(budget.target_error.is_some() || budget.time_s.is_some()),
             share: options.share.unwrap_or(true),
             mmlt: options.mmlt.unwrap_or_default(),
         };
