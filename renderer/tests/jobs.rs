@@ -165,12 +165,13 @@ fn passes_of_open_ended_jobs_start_small_and_deal_evenly() {
                 break;
             }
         }
-        assert_eq!(done, 150, "{kind:?}");
+        // Groups that are dealt their samples by noise get whole ones.
+        assert_eq!(done, if s.adapts() { 150u64.next_multiple_of(g.into()) } else { 150 }, "{kind:?}");
         assert!(passes > 20, "{kind:?}: {passes} passes");
         let (most, least) = (turns.iter().max().unwrap(), turns.iter().min().unwrap());
         assert!(most - least <= 1, "{kind:?}: {turns:?}");
         if kind != IntegratorKind::Mmlt {
-            assert_eq!(upto.iter().sum::<u32>(), 150);
+            assert_eq!(u64::from(upto.iter().sum::<u32>()), done);
         }
     }
 }

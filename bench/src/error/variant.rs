@@ -93,7 +93,9 @@ impl Variant {
             let to = match (self.kind, t.key.as_str()) {
                 (IntegratorKind::Path | IntegratorKind::Auto, "adaptive") => &mut options.adaptive,
                 (IntegratorKind::Path, "share") => &mut options.share,
-                (kind, key) => return Err(format!("{}: the integrator {} has no option {key:?}", self.name, kind.name())),
+                (kind, key) => {
+                    return Err(format!("{}: the integrator {} has no option {key:?}", self.name, kind.name()));
+                }
             };
             let value = t.value.as_deref().unwrap_or("true").parse();
             *to = Some(value.map_err(|_| format!("{}: {} is true or false", self.name, t.key))?);

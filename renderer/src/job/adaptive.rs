@@ -6,11 +6,12 @@
 //! they find, and the group's expectation is the image. All groups count alike, whatever they were dealt.
 
 use super::plan::Dealing;
+use super::planner::CHECKPOINT_SAMPLES;
 use super::settings::RenderSettings;
 use crate::film::{GroupFilm, TileGrid, TiledFilm};
 
-/// Samples of a pixel that each group has before its noise is believed.
-pub const PILOT: u32 = 2;
+/// Samples of a pixel that each group has before its noise is believed, where their number is known to be small beside what is to come.
+const PILOT: u32 = 2;
 /// Share of the samples that goes to all pixels alike: what seems quiet may not have been found yet.
 const UNIFORM_SHARE: f64 = 0.2;
 /// Keeps relative errors from dividing by the darkness of black pixels, as in the error that is told.
@@ -23,11 +24,17 @@ pub fn films(settings: &RenderSettings) -> Option<Vec<GroupFilm>> {
     Some((0..settings.replicates).map(|_| film()).collect())
 }
 
+/// Samples per pixel, in all groups, that go to all tiles alike. In a job that time or error ends, passes of whole groups wait until they
+/// are small beside what is done.
+pub fn pilot(settings: &RenderSettings) -> u32 {
+    settings.replicates * if settings.is_counted() { PILOT } else { CHECKPOINT_SAMPLES }
+}
+
 /// How the next pass deals `share` samples per pixel of each group, after `done` of all groups; `None` where that is the same for all
 /// tiles: while there is nothing to go by.
 pub fn deal(settings: &RenderSettings, films: &[GroupFilm], done: u32, share: u32) -> Option<Vec<Vec<[u32; 2]>>> {
     let g = settings.replicates;
-    if g < 4 || done < PILOT * g || !done.is_multiple_of(g) {
+    if g < 4 || done < pilot(settings) || !done.is_multiple_of(g) {
         return None;
     }
     let (even, odd) = (half(films, 0), half(films, 1));

@@ -97,26 +97,19 @@ impl Planner {
             return pass_size(&self.settings, done, left);
         }
         // A tile's samples should come together: what each of them shares is found out better then.
-        let pilot = adaptive::PILOT * g;
-        let counted = self.is_counted();
+        let pilot = adaptive::pilot(&self.settings);
+        let counted = self.settings.is_counted();
         if done < pilot {
-            let pixels = u64::from(self.settings.width) * u64::from(self.settings.height);
-            let most = if counted { pilot } else { (PASS_SAMPLES / pixels).clamp(1, u64::from(pilot)) as u32 };
-            return if most > g { most / g * g } else { most }.min(left).min(pilot - done);
+            let size = if counted { pilot } else { pass_size(&self.settings, done, left) };
+            return size.min(left).min(pilot - done);
         }
         let size = if counted { (done / 2).min(left) } else { pass_size(&self.settings, done, left) };
         if size > 0 { (done + size).next_multiple_of(g) - done } else { 0 }
     }
 
-    /// Whether nothing but the number of samples ends the job.
-    fn is_counted(&self) -> bool {
-        let b = &self.settings.budget;
-        b.spp.is_some() && b.time_s.is_none() && b.target_error.is_none()
-    }
-
     /// The samples per pixel of a job that nothing but their number ends, and that goes to all pixels alike.
     fn sample_budget(&self) -> Option<u32> {
-        self.settings.budget.spp.filter(|_| self.is_counted() && !self.settings.adapts())
+        self.settings.budget.spp.filter(|_| self.settings.is_counted() && !self.settings.adapts())
     }
 
     /// Whether the first pass is a pilot of whole groups.

@@ -160,6 +160,12 @@ impl RenderSettings {
         Ok(settings)
     }
 
+    /// Whether nothing but the number of samples ends the job.
+    pub fn is_counted(&self) -> bool {
+        let b = &self.budget;
+        b.spp.is_some() && b.time_s.is_none() && b.target_error.is_none()
+    }
+
     /// Whether samples go to the tiles that need them; only those of `path` do.
     pub fn adapts(&self) -> bool {
         self.adaptive && self.integrator == IntegratorKind::Path
