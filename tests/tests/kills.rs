@@ -15,6 +15,8 @@ const WORK: Duration = Duration::from_secs(4);
 /// A render that is the same for `lightfarm render` and for the farm.
 struct Work {
     integrator: &'static str,
+    /// Options beside those that all have.
+    more: &'static [&'static str],
     /// Samples or mutations a pixel.
     budget: u32,
 }
@@ -23,7 +25,8 @@ impl Work {
     fn options(&self) -> Vec<String> {
         let unit = if self.integrator == "mmlt" { "--mpp" } else { "--spp" };
         let budget = self.budget.to_string();
-        ["--integrator", self.integrator, unit, &budget, "--size", "128x96", "--seed", "7"].map(String::from).into()
+        let all = ["--integrator", self.integrator, unit, &budget, "--size", "128x96", "--seed", "7"];
+        all.iter().chain(self.more).map(|s| s.to_string()).collect()
     }
 
     /// What `lightfarm render` makes of it.
@@ -38,8 +41,8 @@ impl Work {
     }
 
     /// As much work as takes one core long enough, and its reference.
-    fn of(integrator: &'static str, folder: &TempDir) -> (Self, PathBuf) {
-        let mut work = Self { integrator, budget: 64 };
+    fn of(integrator: &'static str, more: &'static [&'static str], folder: &TempDir) -> (Self, PathBuf) {
+        let mut work = Self { integrator, more, budget: 64 };
         loop {
             let start = Instant::now();
             let reference = work.reference(folder, "1");
@@ -179,9 +182,9 @@ fn coordinator_killed_in_each_pass(work: &Work, reference: &Path) {
     assert_same_pixels(reference, &farm.fetch(&job, "coordinator.exr"));
 }
 
-fn all(integrator: &'static str) {
+fn all(integrator: &'static str, more: &'static [&'static str]) {
     let folder = TempDir::new().unwrap();
-    let (work, one) = Work::of(integrator, &folder);
+    let (work, one) = Work::of(integrator, more, &folder);
     assert_same_pixels(&one, &work.reference(&folder, "2"));
     one_worker(&work, &one);
     three_workers(&work, &one);
@@ -194,27 +197,33 @@ fn all(integrator: &'static str) {
 
 #[test]
 fn tiles_are_the_same_through_every_history() {
-    all("path");
+    all("path", &[]);
+}
+
+/// Samples that go where earlier passes found noise.
+#[test]
+fn dealt_samples_are_the_same_through_every_history() {
+    all("path", &["--adaptive"]);
 }
 
 #[test]
 fn splats_are_the_same_through_every_history() {
-    all("light");
+    all("light", &[]);
 }
 
 #[test]
 fn tiles_with_splats_are_the_same_through_every_history() {
-    all("bdpt");
+    all("bdpt", &[]);
 }
 
 /// Trials, and the render that they chose.
 #[test]
 fn trials_choose_the_same_through_every_history() {
-    all("auto");
+    all("auto", &[]);
 }
 
 /// Pilot, pools and chains: passes that depend on what those before them found.
 #[test]
 fn chains_are_the_same_through_every_history() {
-    all("mmlt");
+    all("mmlt", &[]);
 }

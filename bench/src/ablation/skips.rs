@@ -89,6 +89,22 @@ pub const SKIPS: &[Skip] = &[
         without: Without::Settings(|s| s.share = false),
     },
     Skip {
+        name: "known-sharing",
+        what: "finding out anew in each unit what its pixels gain by sharing",
+        scene: "scenes/cornell-diffuse.toml",
+        integrator: Path,
+        settings: AS_THEY_ARE,
+        without: Without::Plan(|p| p.sharing.clear()),
+    },
+    Skip {
+        name: "more-paths",
+        what: "whole paths where a second sample of the lights shows as much",
+        scene: "scenes/plates.toml",
+        integrator: Path,
+        settings: |s| s.max_depth = Some(2),
+        without: Without::Settings(|s| s.share = false),
+    },
+    Skip {
         name: "dim-connections",
         what: "shadow rays of connections that carry little: cast by chance",
         scene: "scenes/cornell.toml",
@@ -154,6 +170,14 @@ pub const SKIPS: &[Skip] = &[
         integrator: Mmlt,
         settings: AS_THEY_ARE,
         without: Without::Settings(|s| s.mmlt.direct_edges = 0),
+    },
+    Skip {
+        name: "neighbours",
+        what: "mutations for each pixel where those of the pixels around tell as much",
+        scene: "scenes/cornell-diffuse.toml",
+        integrator: Mmlt,
+        settings: AS_THEY_ARE,
+        without: Without::Settings(|s| s.mmlt.neighbours = 0),
     },
 ];
 
