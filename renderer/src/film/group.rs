@@ -3,7 +3,7 @@ use super::{SplatSums, TileGrid, TileSums, TiledFilm};
 /// The film of one replicate group: a complete, independent estimate of the image.
 ///
 /// Open, it holds f64 sums (36 bytes a pixel of tiles, 24 of splats, 60 of both); closed, the mean in f32 (12 bytes a pixel). Where
-/// samples are the budget, one group is open at a time; where time or error is, all are.
+/// samples are the budget, few groups are open at a time; where time or error is, all are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GroupFilm {
     /// No sample yet.
