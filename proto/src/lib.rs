@@ -12,7 +12,7 @@ mod generated {
 
 pub use generated::*;
 
-/// Version of the protocol; peers of another version are refused.
-pub const PROTOCOL: u32 = 1;
+/// Version of the protocol, and of the plans and results that it carries; peers of another version are refused.
+pub const PROTOCOL: u32 = 2;
 /// Bytes of data in one message of a bulk stream.
 pub const CHUNK: usize = 256 << 10;

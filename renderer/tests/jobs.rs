@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "test helpers")]
 
 use renderer::film::{Aov, Counters, SplatSums, TileSums};
-use renderer::integrator::IntegratorKind;
 use renderer::integrator::mmlt::{BootstrapSums, ChainStats, Found};
+use renderer::integrator::{IntegratorKind, Lesson};
 use renderer::job::{
     Merger, Part, PassPlan, Planner, RenderOptions, RenderSettings, Sampling, Unit, UnitKind, UnitResult,
 };
@@ -38,6 +38,11 @@ fn made_up(plan: &PassPlan, unit: &Unit) -> UnitResult {
             let aovs = if unit.replicate == 0 { (0..rect.area()).map(aov).collect() } else { Vec::new() };
             let weights = vec![(end - start) as f32; covered.area()];
             result.tile = Some(TileSums { rect, covered, samples: end - start, sums, weights, aovs });
+            if plan.sampling == Sampling::Tiles {
+                let numbers = std::array::from_fn(|i| f64::from(value(i)) + 1.0 / 3.0);
+                result.sharing = Lesson::of_numbers(numbers);
+                assert!(result.sharing.is_some());
+            }
             if plan.sampling == Sampling::SplattingTiles {
                 result.splats = Some(splats(plan, unit));
                 result.paths = rect.area() as u64 * u64::from(end - start);

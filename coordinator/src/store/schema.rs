@@ -10,8 +10,8 @@ use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, TransactionBehavio
 use std::path::Path;
 use std::time::Duration;
 
-/// Version of the tables; a folder of another version is refused.
-const VERSION: u32 = 1;
+/// Version of the tables and of the plans and results that belong to them; a folder of another version is refused.
+const VERSION: u32 = 2;
 
 const TABLES: &str = "
 CREATE TABLE meta (key TEXT PRIMARY KEY, value INTEGER NOT NULL) WITHOUT ROWID;

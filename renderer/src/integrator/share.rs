@@ -81,7 +81,7 @@ pub(super) fn render(
             y = y1;
         }
     }
-    lessons.sharing = Some(gauge.lesson());
+    lessons.sharing = gauge.lesson().checked();
     Some(tile.finish(samples.end - samples.start))
 }
 

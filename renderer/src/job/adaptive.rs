@@ -68,10 +68,12 @@ fn ranges(own: &TiledFilm, others: &[&TiledFilm], total: u32) -> Vec<[u32; 2]> {
     let mut left = 0.0;
     let range = |t: usize| {
         let most = done[t] + needs[t] + left / areas[t];
-        let upto = match needs[t] > 0.0 {
-            true if last == Some(t) => f64::max(most.floor(), done[t]),
-            true => rounded(done[t], most),
-            false => done[t],
+        let upto = if last == Some(t) {
+            f64::max(most.floor(), done[t])
+        } else if needs[t] > 0.0 {
+            rounded(done[t], most)
+        } else {
+            done[t]
         };
         left += (done[t] + needs[t] - upto) * areas[t];
         [done[t] as u32, upto as u32]

@@ -88,6 +88,11 @@ impl Lesson {
         sound.then_some(Self { firsts, rays, lit, samples, shared, own, direct, reflected })
     }
 
+    /// This, if its numbers are some: squares of very bright light may be out of range.
+    pub fn checked(self) -> Option<Self> {
+        Self::of_numbers(self.numbers())
+    }
+
     /// Adds what others teach.
     pub fn add(&mut self, other: &Self) {
         let (a, b) = (self.numbers(), other.numbers());
