@@ -134,6 +134,7 @@ mod tests {
         assert_eq!(spp("path:spp=2"), Some(2));
         assert_eq!(spp("path:time=2"), None);
     }
+
     #[test]
     fn path_has_switches() {
         let options = |text: &str| text.parse::<Variant>().unwrap().render_options(Budget::default());

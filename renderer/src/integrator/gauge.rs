@@ -50,13 +50,8 @@ pub(super) struct Gauge {
 #[derive(Clone, Default)]
 struct Half {
     regions: Vec<Region>,
-    /// First samples, their rays, and how many of them have a vertex that takes samples of lights.
-    firsts: f64,
-    rays: f64,
-    lit: f64,
-    samples: f64,
-    /// Samples that have something to share.
-    shared: f64,
+    /// How many samples, and their rays; variances are those of the regions.
+    counts: Lesson,
 }
 
 /// What was watched in a part of the tile.
@@ -161,8 +156,8 @@ impl Gauge {
         let last = self.last[row as usize].replace(seen).filter(|_| column > 0);
         let like = last.filter(|last| last.is_like(&seen));
         let region = &mut half.regions[(row / REGION * self.rect.width().div_ceil(REGION) + column / REGION) as usize];
-        half.samples += 1.0;
-        half.shared += if seen.reflected.is_black() { 0.0 } else { 1.0 };
+        half.counts.samples += 1.0;
+        half.counts.shared += if seen.reflected.is_black() { 0.0 } else { 1.0 };
         let square = |a: Rgb, b: Rgb| {
             let difference = f64::from((a - b).luminance());
             difference * difference
@@ -176,8 +171,8 @@ impl Gauge {
         if !first {
             return;
         }
-        half.firsts += 1.0;
-        half.rays += seen.rays as f64;
+        half.counts.firsts += 1.0;
+        half.counts.rays += seen.rays as f64;
         region.firsts += 1.0;
         region.own_light += f64::from(seen.own.luminance());
         if let Some(last) = &like {
@@ -187,7 +182,7 @@ impl Gauge {
             region.edges += edge(f64::from(last.own.luminance()), f64::from(seen.own.luminance()));
         }
         if let Some(direct) = seen.direct {
-            half.lit += 1.0;
+            half.counts.lit += 1.0;
             region.direct += direct;
         }
     }
@@ -217,15 +212,8 @@ impl Gauge {
     }
 
     fn lesson_of<'a>(halves: impl Iterator<Item = &'a Half> + Clone) -> Lesson {
-        let total = |of: fn(&Half) -> f64| halves.clone().map(of).sum::<f64>();
-        let mut lesson = Lesson {
-            firsts: total(|h| h.firsts),
-            rays: total(|h| h.rays),
-            lit: total(|h| h.lit),
-            samples: total(|h| h.samples),
-            shared: total(|h| h.shared),
-            ..Lesson::default()
-        };
+        let mut lesson = Lesson::default();
+        halves.clone().for_each(|half| lesson.add(&half.counts));
         let regions = || halves.clone().flat_map(|h| &h.regions);
         let floor = FLOOR * regions().map(Region::brightness).sum::<f64>() / lesson.firsts;
         regions().for_each(|region| region.teach(&mut lesson, floor));

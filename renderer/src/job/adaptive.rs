@@ -27,7 +27,7 @@ pub fn films(settings: &RenderSettings) -> Option<Vec<GroupFilm>> {
 /// Samples per pixel, in all groups, that go to all tiles alike. In a job that time or error ends, passes of whole groups wait until they
 /// are small beside what is done.
 pub fn pilot(settings: &RenderSettings) -> u32 {
-    settings.replicates * if settings.is_counted() { PILOT } else { CHECKPOINT_SAMPLES }
+    settings.replicates * if settings.budget.is_counted() { PILOT } else { CHECKPOINT_SAMPLES }
 }
 
 /// How the next pass deals `share` samples per pixel of each group, after `done` of all groups; `None` where that is the same for all

@@ -8,6 +8,8 @@ use std::ops::Range;
 
 /// Samples (or light paths) that one unit aims at: some tens of milliseconds of work.
 const UNIT_SAMPLES: u64 = 1 << 16;
+/// Side of the largest tiles of ordinary samples, in pixels.
+pub const LARGEST_TILE: u32 = 128;
 /// Most samples of a pixel in a unit.
 const SAMPLE_CHUNK: u32 = 256;
 /// Bootstrap samples of a unit.
@@ -210,7 +212,7 @@ impl PassPlan {
         let fits = |s: &u32| u64::from(s * s) * n <= self.unit_samples();
         [1024u32, 512, 256, 128, 64, 32]
             .into_iter()
-            .filter(|s| self.sampling != Sampling::Tiles || *s <= 128)
+            .filter(|s| self.sampling != Sampling::Tiles || *s <= LARGEST_TILE)
             .find(fits)
             .unwrap_or(16)
     }

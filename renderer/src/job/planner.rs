@@ -98,7 +98,7 @@ impl Planner {
         }
         // A tile's samples should come together: what each of them shares is found out better then.
         let pilot = adaptive::pilot(&self.settings);
-        let counted = self.settings.is_counted();
+        let counted = self.settings.budget.is_counted();
         if done < pilot {
             let size = if counted { pilot } else { pass_size(&self.settings, done, left) };
             return size.min(left).min(pilot - done);
@@ -109,7 +109,7 @@ impl Planner {
 
     /// The samples per pixel of a job that nothing but their number ends, and that goes to all pixels alike.
     fn sample_budget(&self) -> Option<u32> {
-        self.settings.budget.spp.filter(|_| self.settings.is_counted() && !self.settings.adapts())
+        self.settings.budget.spp.filter(|_| self.settings.budget.is_counted() && !self.settings.adapts())
     }
 
     /// Whether the first pass is a pilot of whole groups.

@@ -21,6 +21,13 @@ pub struct Budget {
     pub target_error: Option<f64>,
 }
 
+impl Budget {
+    /// Whether nothing but the number of samples or mutations ends the job.
+    pub fn is_counted(&self) -> bool {
+        self.time_s.is_none() && self.target_error.is_none()
+    }
+}
+
 /// Everything that decides a job's pixels, beside the scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -158,12 +165,6 @@ impl RenderSettings {
         };
         settings.validate()?;
         Ok(settings)
-    }
-
-    /// Whether nothing but the number of samples ends the job.
-    pub fn is_counted(&self) -> bool {
-        let b = &self.budget;
-        b.spp.is_some() && b.time_s.is_none() && b.target_error.is_none()
     }
 
     /// Whether samples go to the tiles that need them; only those of `path` do.

@@ -2,14 +2,14 @@
 //! itself.) Groups of even number go by what those of odd number found, and the other way round, since the samples of a group depend on
 //! one another.
 
-use super::plan::PassPlan;
+use super::plan::{LARGEST_TILE, PassPlan};
 use super::settings::RenderSettings;
 use super::unit::{Unit, UnitKind};
 use crate::film::{Filter, Rect};
 use crate::integrator::{Choice, Gains, Lesson};
 
-/// Side of the cells for each of which it is decided, in pixels: whole tiles, as large as they get on films of usual size.
-const CELL: u32 = 128;
+/// Side of the cells for each of which it is decided, in pixels: each holds whole tiles, if the film is not so large that tiles of adaptive jobs are larger.
+const CELL: u32 = LARGEST_TILE;
 
 /// What the samples of a job have taught of sharing.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -57,7 +57,7 @@ fn both_halves_are_watched_from_the_first() {
     for height in 9..70 {
         let mut gauge = gauge_of(Rect { y1: 64 + height, ..TILE }, true);
         watch(&mut gauge, 64..64 + height, 0, 0.05, 2.0);
-        assert!(gauge.halves.iter().all(|h| h.firsts > 0.0), "{height} rows");
+        assert!(gauge.halves.iter().all(|h| h.counts.firsts > 0.0), "{height} rows");
     }
 }
 

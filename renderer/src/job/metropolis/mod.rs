@@ -111,7 +111,7 @@ fn pixels(settings: &RenderSettings) -> f64 {
 /// Mutations per pixel that nothing but their number ends.
 fn fixed_budget(settings: &RenderSettings) -> Option<u32> {
     let b = &settings.budget;
-    b.mpp.filter(|_| b.time_s.is_none() && b.target_error.is_none())
+    b.mpp.filter(|_| b.is_counted())
 }
 
 fn first_mutations(settings: &RenderSettings) -> u32 {
