@@ -55,8 +55,8 @@ impl Budget {
                 pilot_spp: 32,
                 least_spp: 256,
                 aim: 0.005,
-                samples: Limits { required: 0.02, rays: 6e6 },
-                chains: Limits { required: 0.25, rays: 2.4e7 },
+                samples: Limits { required: 0.02, rays: 3e6 },
+                chains: Limits { required: 0.25, rays: 1.2e7 },
             },
             Self::Full => Effort {
                 pilot_spp: 128,
