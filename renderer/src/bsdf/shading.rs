@@ -118,6 +118,15 @@ impl ShadingPoint {
         }
     }
 
+    /// The geometric normal on the side of `wo`, if light counts from there only; else zero.
+    #[inline]
+    pub fn up(&self) -> Vec3 {
+        match self.sides {
+            Sides::Same => self.ng * self.wo_dot_ng.signum(),
+            Sides::Any | Sides::Consistent => Vec3::ZERO,
+        }
+    }
+
     /// What `bsdf` in `frame` is from `wo`; `bent`: the frame is that of a normal map.
     #[inline(always)]
     fn seen(frame: Frame, ng: Vec3, wo: Vec3, bsdf: Bsdf, bent: bool) -> Self {

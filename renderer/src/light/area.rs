@@ -1,5 +1,5 @@
 use super::sphere::Sphere;
-use super::{Emission, Emitter, LeSample, LiSample, LightContext, LightFlags};
+use super::{Emission, Emitter, LeSample, LiSample, LightBounds, LightContext, LightFlags};
 use crate::geometry::{Geometry, Hit, Interaction, ObjectId, SurfaceSample};
 use crate::math::rounding::gamma;
 use crate::math::{Anchor, Frame, INV_PI, ONE_MINUS_EPSILON, Ray, Vec2, Vec3};
@@ -160,6 +160,10 @@ impl Emitter for AreaLight {
         let cos = ng.dot(w);
         let pdf_dir = if self.two_sided { 0.5 * cos.abs() } else { cos.max(0.0) };
         (1.0 / self.area, pdf_dir * INV_PI)
+    }
+
+    fn bounds(&self, ctx: &LightContext) -> Option<LightBounds> {
+        Some(LightBounds::object(ctx.geometry, self.object, self.two_sided))
     }
 
     fn power(&self, ctx: &LightContext) -> Rgb {

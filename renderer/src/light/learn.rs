@@ -12,7 +12,7 @@ const MOST: usize = 1024;
 /// probabilities are with which lights are selected meanwhile.
 #[derive(Clone, Debug, Default)]
 pub struct LightLessons {
-    /// For each light the squares of its samples' contributions times its probability, then for each its samples' rays over its
+    /// For each light the squares of its samples' contributions times its probability, then for each what its samples cost over its
     /// probability.
     sums: Vec<f64>,
 }
@@ -33,9 +33,17 @@ impl LightLessons {
     /// A sample of a light was made, which was selected with probability `pmf`, and took so many rays.
     #[inline]
     pub fn tried(&mut self, light: usize, pmf: f32, rays: u64) {
+        self.expected(light, pmf, rays as f64);
+    }
+
+    /// A sample of a light was made, which was selected with probability `pmf`; by the bound of its place it would give so much, squared.
+    /// In place of [`LightLessons::tried`] where lights are selected by that bound: all samples cost the same then, and the weights are
+    /// what lights give over what was expected of them.
+    #[inline]
+    pub fn expected(&mut self, light: usize, pmf: f32, square: f64) {
         let half = self.sums.len() / 2;
-        if half > 0 {
-            self.sums[half + light] += rays as f64 / f64::from(pmf);
+        if half > 0 && square.is_finite() {
+            self.sums[half + light] += square / f64::from(pmf);
         }
     }
 

@@ -12,7 +12,7 @@ mod desc;
 mod directional;
 mod environment;
 mod learn;
-
+mod place;
 mod point;
 mod sample;
 mod select;
@@ -20,6 +20,7 @@ mod sphere;
 mod spot;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 pub use area::AreaLight;
 pub use constant::ConstantLight;
@@ -27,6 +28,7 @@ pub use desc::{Emission, LightDesc, SpotFalloff};
 pub use directional::DirectionalLight;
 pub use environment::EnvironmentLight;
 pub use learn::{LightLessons, selection_weights};
+pub use place::{LightBounds, Place};
 pub use point::PointLight;
 pub use sample::{LeSample, LiSample, LightContext, LightFlags};
 pub use select::LightSelector;
@@ -70,6 +72,9 @@ trait Emitter {
     fn pdf_le(&self, ctx: &LightContext, ng: Vec3, w: Vec3) -> (f32, f32);
     fn power(&self, ctx: &LightContext) -> Rgb;
 
+    fn bounds(&self, _ctx: &LightContext) -> Option<LightBounds> {
+        None
+    }
     fn pdf_li(&self, _ctx: &LightContext, _p: Vec3, _at: &Anchor) -> f32 {
         0.0
     }
@@ -171,6 +176,11 @@ macro_rules! lights {
             /// an estimate.
             pub fn power(&self, ctx: &LightContext) -> Rgb {
                 match self { $(Self::$variant(l) => l.power(ctx),)* }
+            }
+
+            /// Where it is and where it shines; `None` of infinite lights.
+            pub fn bounds(&self, ctx: &LightContext) -> Option<LightBounds> {
+                match self { $(Self::$variant(l) => l.bounds(ctx),)* }
             }
         }
     };

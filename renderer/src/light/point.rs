@@ -1,4 +1,4 @@
-use super::{Emitter, LeSample, LiSample, LightContext, LightError, LightFlags, emits};
+use super::{Emitter, LeSample, LiSample, LightBounds, LightContext, LightError, LightFlags, emits};
 use crate::math::{Anchor, DVec3, INV_4PI, Ray, Vec2, Vec3};
 use crate::sampling::warp;
 use crate::spectrum::Rgb;
@@ -62,6 +62,10 @@ impl Emitter for PointLight {
 
     fn pdf_le(&self, _ctx: &LightContext, _ng: Vec3, _w: Vec3) -> (f32, f32) {
         (0.0, INV_4PI)
+    }
+
+    fn bounds(&self, _ctx: &LightContext) -> Option<LightBounds> {
+        Some(LightBounds::point(self.position))
     }
 
     fn power(&self, _ctx: &LightContext) -> Rgb {

@@ -1,6 +1,9 @@
 use super::directional::unit;
+use super::place::Cone;
 use super::point::{POINT_FLAGS, direction_to};
-use super::{Emitter, LeSample, LiSample, LightContext, LightDesc, LightError, LightFlags, SpotFalloff, emits};
+use super::{
+    Emitter, LeSample, LiSample, LightBounds, LightContext, LightDesc, LightError, LightFlags, SpotFalloff, emits,
+};
 use crate::math::{Anchor, Frame, Ray, Vec2, Vec3, cos64, pow, safe_asin, safe_sqrt, sin_cos, sin64, sqr};
 use crate::spectrum::Rgb;
 use std::f32::consts::{PI, TAU};
@@ -159,6 +162,13 @@ impl Emitter for SpotLight {
 
     fn pdf_le(&self, _ctx: &LightContext, _ng: Vec3, w: Vec3) -> (f32, f32) {
         (0.0, self.pdf_dir(one_minus_cos(w, self.frame.n)))
+    }
+
+    fn bounds(&self, _ctx: &LightContext) -> Option<LightBounds> {
+        let normals = Cone { axis: self.frame.n, angle: self.beam.min(PI) };
+        // About as if it filled the cone halfway between beam and cutoff.
+        let gain = 4.0 / (self.omc_beam + self.omc_cutoff);
+        Some(LightBounds { normals, spread: self.cutoff - self.beam, gain, ..LightBounds::point(self.position) })
     }
 
     fn power(&self, _ctx: &LightContext) -> Rgb {

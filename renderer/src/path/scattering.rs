@@ -141,6 +141,15 @@ impl Scattering {
         }
     }
 
+    /// Unit normal of the half space from which light is reflected; zero where it may come from everywhere.
+    #[inline]
+    pub fn up(&self) -> Vec3 {
+        match self {
+            Self::Surface(shading) => shading.up(),
+            Self::Medium(_) => Vec3::ZERO,
+        }
+    }
+
     /// The shading normal; a medium has none, zero.
     pub fn normal(&self) -> Vec3 {
         match self {

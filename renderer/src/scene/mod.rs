@@ -151,11 +151,12 @@ impl Scene {
         // Find what is there.
         let infinite_lights = (0..lights.len() as u32).filter(|i| lights[*i as usize].flags().infinite).collect();
         let context = LightContext { geometry: &geometry, textures: &textures, bounds };
+        let places: Vec<_> = lights.iter().map(|l| l.bounds(&context)).collect();
         let powers: Vec<f32> = lights.iter().map(|l| l.power(&context).luminance()).collect();
         let features = SceneFeatures::find(&geometry, &materials, &textures, &lights, &info, (&media, global_medium));
         let mut scene = Self {
             accel: accel?,
-            selector: LightSelector::new(&powers),
+            selector: LightSelector::placed(&powers, &places, bounds.radius),
             geometry,
             materials,
             textures,

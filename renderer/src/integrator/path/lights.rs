@@ -5,7 +5,7 @@ use super::split::{LIGHTS, of_direction, of_light};
 use super::{Arrival, Here, Leg, Walk};
 use crate::bsdf::Transport;
 use crate::geometry::Interaction;
-use crate::light::LiSample;
+use crate::light::{LiSample, Place};
 use crate::math::{Ray, Vec2, Vec3};
 use crate::medium::passing_probability;
 use crate::sampling::{Choice, Sampler};
@@ -49,7 +49,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
             let weight = if arrival.alone {
                 1.0
             } else {
-                let pdf_light = self.c.selector.pmf(i as usize) * light.pdf_li_escaped(ray.d);
+                let pdf_light = self.c.selector.pmf_at(&arrival.place(), i as usize) * light.pdf_li_escaped(ray.d);
                 of_direction(arrival.pdf, pdf_light, arrival.lights)
             };
             sum += light.le_infinite(ray.d) * weight;
@@ -65,16 +65,21 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
         if radiance.is_black() || arrival.alone {
             return radiance;
         }
-        let pdf_light = self.c.selector.pmf(index as usize) * light.pdf_li(&context, arrival.from.p, &hit.anchor());
+        let pmf = self.c.selector.pmf_at(&arrival.place(), index as usize);
+        let pdf_light = pmf * light.pdf_li(&context, arrival.from.p, &hit.anchor());
         radiance * of_direction(arrival.pdf, pdf_light, arrival.lights)
     }
 
     /// A sample of a light by three numbers.
     #[inline(always)]
-    fn candidate(&mut self, here: Here, (uc, u): (f32, Vec2)) -> Option<Candidate> {
+    fn candidate(&mut self, here: Here, beta: Rgb, (uc, u): (f32, Vec2)) -> Option<Candidate> {
         let scene = self.c.scene;
-        let choice = self.c.selector.sample(uc)?;
-        self.lessons.tried(choice.index, choice.pmf, 1);
+        let place = Place { p: here.anchor.p, up: here.scattering.up() };
+        let choice = self.c.selector.sample_at(&place, uc)?;
+        if self.lessons.learns() {
+            let expected = f64::from(self.c.selector.expected(&place, choice.index)) * f64::from(beta.luminance());
+            self.lessons.expected(choice.index, choice.pmf, expected * expected);
+        }
         let light = &scene.lights[choice.index];
         let li = light.sample_li(&scene.light_context(), here.anchor.p, choice.u, u)?;
         let (f, pdf_scattering) = here.scattering.eval_pdf(li.wi, Transport::Radiance);
@@ -86,10 +91,10 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
     }
 
     /// Light that comes straight from a chosen light, and the choice.
-    pub(super) fn next_event(&mut self, here: Here, leg: &Leg) -> Option<(Choice, Rgb)> {
+    pub(super) fn next_event(&mut self, here: Here, leg: &Leg, beta: Rgb) -> Option<(Choice, Rgb)> {
         let scene = self.c.scene;
         let numbers = self.sampler.next_3();
-        let candidate = self.candidate(here, numbers);
+        let candidate = self.candidate(here, beta, numbers);
         let found = candidate.as_ref()?;
         let li = &found.li;
         if MEDIA {
@@ -119,7 +124,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
         let mut count = 0;
         for i in 0..self.lights {
             let numbers = self.sampler.one_of(self.lights, i).next_3();
-            let candidate = self.candidate(here, numbers);
+            let candidate = self.candidate(here, Rgb::ONE, numbers);
             let Some(found) = &candidate else { continue };
             let value = found.value(found.factor(found.pdf_scattering, self.lights));
             if !value.is_black() {

@@ -13,8 +13,8 @@ use super::{Lessons, UnitContext, tile};
 use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
-use crate::light::LightLessons;
-use crate::math::{Anchor, Ray};
+use crate::light::{LightLessons, Place};
+use crate::math::{Anchor, Ray, Vec3};
 use crate::medium::{Channels, passing_probability};
 use crate::path::{MediumPoint, Scattering, roulette};
 use crate::sampling::{Sampler, SobolSampler};
@@ -71,6 +71,16 @@ struct Arrival {
     alone: bool,
     /// How many samples of lights the vertex before has taken.
     lights: u32,
+    /// From where light counts there ([`Place::up`]).
+    up: Vec3,
+}
+
+impl Arrival {
+    /// The vertex before, as lights were selected for it.
+    #[inline]
+    fn place(&self) -> Place {
+        Place { p: self.from.p, up: self.up }
+    }
 }
 
 /// A flight before it is made.
@@ -119,7 +129,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
         let lens = Anchor::free(camera_ray.o);
-        let arrival = Arrival { from: lens, pdf: 0.0, alone: true, lights: 1 };
+        let arrival = Arrival { from: lens, pdf: 0.0, alone: true, lights: 1, up: Vec3::ZERO };
         let mut leg = Leg { ray: camera_ray, around: scene.camera_enclosures, tau: Rgb::ZERO, arrival };
         let mut edges = 0;
         while edges < self.c.max_depth {
@@ -182,7 +192,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
             if lights > 1 {
                 let direct = self.several_lights(here);
                 self.add(&mut total, beta, direct);
-            } else if connects && let Some((choice, direct)) = self.next_event(here, &leg) {
+            } else if connects && let Some((choice, direct)) = self.next_event(here, &leg, prefix * beta) {
                 self.add(&mut total, beta, direct);
                 self.lessons.gave(choice.index, choice.pmf, prefix * beta * direct);
             } else if SHARE {
@@ -210,7 +220,8 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
             }
             eta_scale *= s.eta * s.eta;
             leg.ray = here.anchor.ray(s.wi);
-            leg.arrival = Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta, lights };
+            leg.arrival =
+                Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta, lights, up: here.scattering.up() };
             if MEDIA {
                 leg.around = scene.beside(here.object, here.anchor, s.wi, &leg.around);
             }

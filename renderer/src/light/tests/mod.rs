@@ -4,6 +4,7 @@ mod directions;
 mod emission;
 mod examples;
 mod irradiance;
+mod places;
 mod shadow;
 mod sky;
 mod spots;

@@ -1,0 +1,196 @@
+//! Where lights are and where they shine: a bound of what they may give to a point (Conty Estevez and Kulla 2018, "Importance Sampling of
+//! Many Lights with Adaptive Tree Splitting"; the cone of directions as in PBR book, 4th edition, section 12.6.3).
+
+use crate::geometry::{Geometry, ObjectId, Shape};
+use crate::math::rounding::gamma;
+use crate::math::{Vec2, Vec3, cos, safe_acos, safe_sqrt, sin_cos};
+use std::f32::consts::PI;
+
+/// A cosine less than this below its limit may be above it but for rounding.
+const ROUNDING: f32 = 1e-4;
+/// Least of a factor that is not 0: a bound by the geometric normal says little of what a bent normal reflects.
+const LEAST: f32 = 0.05;
+
+/// Where light is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// The point, world space.
+    pub p: Vec3,
+    /// Unit normal of the half space from which light counts; zero where it counts from everywhere.
+    pub up: Vec3,
+}
+
+/// Directions of up to an angle from an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cone {
+    /// Unit vector.
+    pub axis: Vec3,
+    /// Radians; from pi on it is all directions.
+    pub angle: f32,
+}
+
+impl Cone {
+    /// All directions.
+    pub const ALL: Self = Self { axis: Vec3::Z, angle: PI };
+
+    /// A cone around both (PBR book, section 3.8.4).
+    pub fn union(self, other: Self) -> Self {
+        let (a, b) = if self.angle >= other.angle { (self, other) } else { (other, self) };
+        if a.angle >= PI {
+            return Self::ALL;
+        }
+        let apart = safe_acos(a.axis.dot(b.axis));
+        if apart + b.angle <= a.angle {
+            return a;
+        }
+        let angle = 0.5 * (a.angle + apart + b.angle);
+        let aside = b.axis - a.axis * a.axis.dot(b.axis);
+        if angle >= PI || !(aside.length_squared() > 0.0) {
+            return Self::ALL;
+        }
+        let (s, c) = sin_cos(angle - a.angle);
+        Self { axis: (a.axis * c + aside.normalize() * s).normalize(), angle }
+    }
+}
+
+/// Where a light is, or several, and where it shines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightBounds {
+    /// A sphere around it.
+    pub(super) centre: Vec3,
+    pub(super) radius: f32,
+    /// Directions in which it shines with all its strength.
+    pub(super) normals: Cone,
+    /// How far around these directions it shines at all; pi/2 and less: falling with the cosine.
+    pub(super) spread: f32,
+    /// Intensity ahead, over what it would be if the power went evenly in all directions.
+    pub(super) gain: f32,
+}
+
+impl LightBounds {
+    /// Of a point that shines in all directions.
+    pub(super) fn point(centre: Vec3) -> Self {
+        Self { centre, radius: 0.0, normals: Cone::ALL, spread: 0.0, gain: 1.0 }
+    }
+
+    /// Of an emitting object.
+    pub(super) fn object(geometry: &Geometry, object: ObjectId, two_sided: bool) -> Self {
+        let (centre, radius, normals) = surface(geometry, object);
+        let radius = radius + gamma(16) * (centre.abs().max_element() + radius);
+        let normals = if two_sided { Cone::ALL } else { normals };
+        let gain = match (normals.angle >= PI, geometry.sphere_world(object)) {
+            (_, Some(_)) => 1.0,
+            (true, None) => 2.0,
+            (false, None) => 4.0,
+        };
+        Self { centre, radius, normals, spread: 0.5 * PI, gain }
+    }
+}
+
+/// A sphere around an object, and a cone around its normals.
+fn surface(geometry: &Geometry, id: ObjectId) -> (Vec3, f32, Cone) {
+    let object = &geometry.objects[id.0 as usize];
+    match object.shape {
+        Shape::Sphere => {
+            let (centre, radius) = geometry.sphere_world(id).unwrap_or((Vec3::ZERO, f32::INFINITY));
+            (centre, radius, Cone::ALL)
+        }
+        Shape::Disk => {
+            let m = object.to_world.matrix();
+            let (a, b) = (m.matrix3.x_axis, m.matrix3.y_axis);
+            // The larger half axis of the ellipse.
+            let (aa, bb, ab) = (a.length_squared(), b.length_squared(), a.dot(b));
+            let radius = (0.5 * (aa + bb + ((aa - bb) * (aa - bb) + 4.0 * ab * ab).sqrt())).sqrt();
+            let axis = geometry.sample_area(id, 0, Vec2::ZERO).ng;
+            (m.translation.as_vec3(), radius as f32, Cone { axis, angle: 0.0 })
+        }
+        Shape::Mesh(_) => {
+            let corners = || {
+                (0..geometry.primitive_count(id))
+                    .filter(|i| geometry.area(id, *i) > 0.0)
+                    .flat_map(|i| [Vec2::ZERO, Vec2::X, Vec2::ONE].map(|u| geometry.sample_area(id, i, u)))
+            };
+            let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+            let mut normals: Option<Cone> = None;
+            for corner in corners() {
+                (low, high) = (low.min(corner.p), high.max(corner.p));
+                let own = Cone { axis: corner.ng, angle: 0.0 };
+                normals = Some(normals.map_or(own, |cone| cone.union(own)));
+            }
+            let centre = 0.5 * low + 0.5 * high;
+            let radius = corners().map(|c| (c.p - centre).length()).fold(0.0, f32::max);
+            (centre, radius, normals.unwrap_or(Cone::ALL))
+        }
+    }
+}
+
+/// Bounds as they are asked.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    centre: Vec3,
+    radius2: f32,
+    axis: Vec3,
+    /// Cosine and sine of the angle of the normals.
+    normals: (f32, f32),
+    /// Cosine of the spread.
+    spread: f32,
+}
+
+impl Reach {
+    pub fn new(bounds: &LightBounds) -> Self {
+        let angle = bounds.normals.angle.min(PI);
+        let (s, c) = if angle >= PI { (0.0, -1.0) } else { sin_cos(angle) };
+        let radius2 = bounds.radius * bounds.radius;
+        Self { centre: bounds.centre, radius2, axis: bounds.normals.axis, normals: (c, s), spread: cos(bounds.spread) }
+    }
+
+    /// Whether a point is within the sphere.
+    #[inline]
+    pub fn contains(&self, p: Vec3) -> bool {
+        (self.centre - p).length_squared() <= self.radius2
+    }
+
+    /// A bound of the irradiance that light of unit strength may give to a place, in 1 / m^2; 0 only where it gives none.
+    #[inline]
+    pub fn importance(&self, place: &Place) -> f32 {
+        let to = self.centre - place.p;
+        let distance2 = to.length_squared();
+        if distance2 <= self.radius2 {
+            return 1.0 / self.radius2;
+        }
+        // Half the angle that the sphere covers.
+        let sin2 = self.radius2 / distance2;
+        let covered = (safe_sqrt(1.0 - sin2), sin2.sqrt());
+        let towards = to / distance2.sqrt();
+
+        // The least angle between a normal and the way to the place.
+        let mut factor = 1.0;
+        if self.normals.0 > -1.0 {
+            let cos = less(less(with_sine(-self.axis.dot(towards)), self.normals), covered).0;
+            if cos < self.spread - ROUNDING {
+                return 0.0;
+            }
+            factor = cos.max(LEAST);
+        }
+        // The least angle of the light that arrives.
+        if place.up != Vec3::ZERO {
+            let cos = less(with_sine(place.up.dot(towards)), covered).0;
+            if cos < -ROUNDING {
+                return 0.0;
+            }
+            factor *= cos.max(LEAST);
+        }
+        (factor / distance2).min(f32::MAX)
+    }
+}
+
+#[inline]
+fn with_sine(cos: f32) -> (f32, f32) {
+    (cos, safe_sqrt(1.0 - cos * cos))
+}
+
+/// Cosine and sine of the angle `a` less the angle `b`, or of 0 if that is less; both in [0, pi].
+#[inline]
+fn less(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
+    if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) }
+}
