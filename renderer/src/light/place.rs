@@ -3,7 +3,7 @@
 
 use crate::geometry::{Geometry, ObjectId, Shape};
 use crate::math::rounding::gamma;
-use crate::math::{Vec2, Vec3, cos, safe_acos, safe_sqrt, sin_cos};
+use crate::math::{self, Vec2, Vec3, safe_acos, sin_cos};
 use std::f32::consts::PI;
 
 /// A cosine less than this below its limit may be above it but for rounding.
@@ -124,73 +124,107 @@ fn surface(geometry: &Geometry, id: ObjectId) -> (Vec3, f32, Cone) {
     }
 }
 
-/// Bounds as they are asked.
+/// How many bounds are asked at once.
+pub(super) const LANES: usize = 4;
+/// A number for each of them.
+pub(super) type Lanes = [f32; LANES];
+
+/// Bounds as they are asked, several at once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach {
-    centre: Vec3,
-    radius2: f32,
-    axis: Vec3,
+    centre: [Lanes; 3],
+    radius2: Lanes,
+    axis: [Lanes; 3],
     /// Cosine and sine of the angle of the normals.
-    normals: (f32, f32),
-    /// Cosine of the spread.
-    spread: f32,
+    cos: Lanes,
+    sin: Lanes,
+    /// Cosine of the spread, less what rounding may do.
+    spread: Lanes,
+}
+
+impl Default for Reach {
+    /// Of nothing: finite everywhere.
+    fn default() -> Self {
+        let (zero, one) = (Lanes::default(), [1.0; LANES]);
+        Self { centre: [zero; 3], radius2: one, axis: [zero; 3], cos: zero, sin: one, spread: zero }
+    }
 }
 
 impl Reach {
-    pub fn new(bounds: &LightBounds) -> Self {
-        let angle = bounds.normals.angle.min(PI);
-        let (s, c) = if angle >= PI { (0.0, -1.0) } else { sin_cos(angle) };
-        let radius2 = bounds.radius * bounds.radius;
-        Self { centre: bounds.centre, radius2, axis: bounds.normals.axis, normals: (c, s), spread: cos(bounds.spread) }
+    /// Sets one of them.
+    pub fn set(&mut self, lane: usize, bounds: &LightBounds) {
+        let (sin, cos) = if bounds.normals.angle >= PI { (0.0, -1.0) } else { sin_cos(bounds.normals.angle) };
+        (self.cos[lane], self.sin[lane]) = (cos, sin);
+        for axis in 0..3 {
+            self.centre[axis][lane] = bounds.centre[axis];
+            self.axis[axis][lane] = bounds.normals.axis[axis];
+        }
+        // A point has a size too, or all would be infinite there.
+        self.radius2[lane] = (bounds.radius * bounds.radius).max(f32::MIN_POSITIVE);
+        self.spread[lane] = math::cos(bounds.spread) - ROUNDING;
     }
 
-    /// Whether a point is within the sphere.
+    /// Whether a point is within the sphere of one of them.
     #[inline]
-    pub fn contains(&self, p: Vec3) -> bool {
-        (self.centre - p).length_squared() <= self.radius2
+    pub fn contains(&self, lane: usize, p: Vec3) -> bool {
+        let centre = Vec3::from_array([0, 1, 2].map(|axis| self.centre[axis][lane]));
+        (centre - p).length_squared() <= self.radius2[lane]
     }
 
-    /// A bound of the irradiance that light of unit strength may give to a place, in 1 / m^2; 0 only where it gives none.
-    #[inline]
-    pub fn importance(&self, place: &Place) -> f32 {
-        let to = self.centre - place.p;
-        let distance2 = to.length_squared();
-        if distance2 <= self.radius2 {
-            return 1.0 / self.radius2;
-        }
-        // Half the angle that the sphere covers.
-        let sin2 = self.radius2 / distance2;
-        let covered = (safe_sqrt(1.0 - sin2), sin2.sqrt());
-        let towards = to / distance2.sqrt();
+    /// Bounds of the irradiance that light of unit strength may give to a place, in 1 / m^2, times `strengths`; 0 only where it gives
+    /// none. Without branches, so that all are computed at once.
+    #[inline(always)]
+    pub fn importance(&self, strengths: &Lanes, place: &Place) -> Lanes {
+        let sided = place.up != Vec3::ZERO;
+        let mut result = Lanes::default();
+        for i in 0..LANES {
+            let [x, y, z] = [0, 1, 2].map(|axis| self.centre[axis][i] - place.p[axis]);
+            let distance2 = x * x + y * y + z * z;
+            let radius2 = self.radius2[i];
+            let within = distance2 <= radius2;
+            let inverse2 = 1.0 / distance2;
+            let inverse = inverse2.sqrt();
 
-        // The least angle between a normal and the way to the place.
-        let mut factor = 1.0;
-        if self.normals.0 > -1.0 {
-            let cos = less(less(with_sine(-self.axis.dot(towards)), self.normals), covered).0;
-            if cos < self.spread - ROUNDING {
-                return 0.0;
-            }
-            factor = cos.max(LEAST);
+            // Half the angle that the sphere covers.
+            let sin2 = radius2 * inverse2;
+            let covered = (positive(1.0 - sin2).sqrt(), sin2.sqrt());
+
+            // The least angle between a normal and the way to the place.
+            let ahead = -(self.axis[0][i] * x + self.axis[1][i] * y + self.axis[2][i] * z) * inverse;
+            let leaving = less(less(with_sine(ahead), (self.cos[i], self.sin[i])), covered).0;
+            let from = if leaving < self.spread[i] { 0.0 } else { at_least(leaving) };
+
+            // The least angle of the light that arrives.
+            let above = (place.up.x * x + place.up.y * y + place.up.z * z) * inverse;
+            let arriving = less(with_sine(above), covered).0;
+            let to = if arriving < -ROUNDING { 0.0 } else { at_least(arriving) };
+            let to = if sided { to } else { 1.0 };
+
+            let outside = from * to * inverse2;
+            result[i] = strengths[i] * if within { 1.0 / radius2 } else { outside };
         }
-        // The least angle of the light that arrives.
-        if place.up != Vec3::ZERO {
-            let cos = less(with_sine(place.up.dot(towards)), covered).0;
-            if cos < -ROUNDING {
-                return 0.0;
-            }
-            factor *= cos.max(LEAST);
-        }
-        (factor / distance2).min(f32::MAX)
+        result
     }
 }
 
 #[inline]
+fn positive(x: f32) -> f32 {
+    if x > 0.0 { x } else { 0.0 }
+}
+
+#[inline]
+fn at_least(x: f32) -> f32 {
+    if x > LEAST { x } else { LEAST }
+}
+
+#[inline]
 fn with_sine(cos: f32) -> (f32, f32) {
-    (cos, safe_sqrt(1.0 - cos * cos))
+    (cos, positive(1.0 - cos * cos).sqrt())
 }
 
 /// Cosine and sine of the angle `a` less the angle `b`, or of 0 if that is less; both in [0, pi].
 #[inline]
 fn less(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
-    if a.0 > b.0 { (1.0, 0.0) } else { (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1) }
+    let (cos, sin) = (a.0 * b.0 + a.1 * b.1, a.1 * b.0 - a.0 * b.1);
+    if a.0 > b.0 { (1.0, 0.0) } else { (cos, sin) }
 }

@@ -1,4 +1,4 @@
-use super::place::{LightBounds, Place};
+use super::place::{Lanes, LightBounds, Place};
 use super::tree::LightTree;
 use crate::math::ONE_MINUS_EPSILON;
 use crate::sampling::{Choice, Discrete};
@@ -24,7 +24,7 @@ enum Kind {
 struct Places {
     tree: Arc<LightTree>,
     /// Of the tree's nodes.
-    strengths: Vec<f32>,
+    strengths: Vec<Lanes>,
     /// The lights without a place.
     infinite: Option<Discrete>,
     /// What an infinite light of unit weight gives, in the measure of [`LightBounds`].

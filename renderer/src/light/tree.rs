@@ -1,33 +1,41 @@
 //! A tree over lights that have a place, by which one is selected for a point (Conty Estevez and Kulla 2018).
 
-use super::place::{Cone, LightBounds, Place, Reach};
+use super::place::{Cone, LANES, Lanes, LightBounds, Place, Reach};
 use crate::math::{ONE_MINUS_EPSILON, Vec3};
 use crate::sampling::Choice;
+use std::ops::Range;
 
-/// No parent, or no light.
+/// No light, no parent.
 const NONE: u32 = u32::MAX;
-/// Most nodes that are opened for a sum.
-const OPENED: usize = 32;
+/// Most children that are opened for a sum.
+const OPENED: usize = 16;
 /// Splits tried along an axis.
 const SPLITS: usize = 12;
 
-/// A node. The first child follows its parent.
-#[derive(Clone, Copy, Debug)]
+/// What a child of a node is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Child {
+    Empty,
+    Node(u32),
+    Light(u32),
+}
+
+/// A node, with the bounds of its children.
+#[derive(Clone, Debug)]
 struct Node {
     reach: Reach,
-    parent: u32,
-    /// Of an inner node.
-    second: u32,
-    /// Of a leaf.
-    light: u32,
+    children: [Child; LANES],
+    /// The node whose child it is, and which.
+    parent: (u32, u32),
 }
 
 /// The lights' places, in a tree.
 #[derive(Clone, Debug)]
 pub(super) struct LightTree {
+    /// Children come after their parent.
     nodes: Vec<Node>,
-    /// By light, the node that is its leaf.
-    leaves: Vec<u32>,
+    /// By light, the node whose child it is, and which.
+    leaves: Vec<(u32, u32)>,
     /// By light.
     gains: Vec<f32>,
 }
@@ -42,75 +50,79 @@ impl LightTree {
             return None;
         }
         let gains = bounds.iter().map(|b| b.map_or(1.0, |b| b.gain)).collect();
-        let mut tree = Self { nodes: Vec::new(), leaves: vec![NONE; bounds.len()], gains };
+        let mut tree = Self { nodes: Vec::new(), leaves: vec![(NONE, 0); bounds.len()], gains };
         tree.build(&mut lights, weights);
         Some(tree)
     }
 
     fn build(&mut self, lights: &mut [(u32, LightBounds)], weights: &[f32]) {
-        // Ranges that wait for their node, with their parent; the first child is on top.
-        let mut open = vec![(0, lights.len(), NONE)];
-        while let Some((start, end, parent)) = open.pop() {
+        // Ranges that wait for their node, with their parent.
+        let mut open = vec![(0..lights.len(), (NONE, 0))];
+        while let Some((range, parent)) = open.pop() {
             let here = self.nodes.len() as u32;
-            if parent != NONE && here != parent + 1 {
-                self.nodes[parent as usize].second = here;
+            if let Some(above) = self.nodes.get_mut(parent.0 as usize) {
+                above.children[parent.1 as usize] = Child::Node(here);
             }
-            let range = &mut lights[start..end];
-            let reach = Reach::new(&around(range));
-            let mut light = NONE;
-            if let [(only, _)] = range {
-                light = *only;
-                self.leaves[light as usize] = here;
-            } else {
-                let middle = start + split(range, weights);
-                open.push((middle, end, here));
-                open.push((start, middle, here));
+            let mut node = Node { reach: Reach::default(), children: [Child::Empty; LANES], parent };
+            for (lane, part) in parts(lights, range, weights).into_iter().enumerate() {
+                node.reach.set(lane, &around(&lights[part.clone()]));
+                if part.len() == 1 {
+                    let (light, _) = lights[part.start];
+                    node.children[lane] = Child::Light(light);
+                    self.leaves[light as usize] = (here, lane as u32);
+                } else {
+                    open.push((part, (here, lane as u32)));
+                }
             }
-            self.nodes.push(Node { reach, parent, second: NONE, light });
+            self.nodes.push(node);
         }
     }
 
-    /// Sums of the lights' weights by node: the strength of what is below it.
-    pub fn strengths(&self, weights: &[f32]) -> Vec<f32> {
-        let mut sums = vec![0.0f64; self.nodes.len()];
+    /// Sums of the lights' weights, times their gain, by node and child.
+    pub fn strengths(&self, weights: &[f32]) -> Vec<Lanes> {
+        let mut sums = vec![[0.0f64; LANES]; self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate().rev() {
-            if node.light != NONE {
-                let light = node.light as usize;
-                sums[i] = f64::from(weights[light]) * f64::from(self.gains[light]);
+            for (lane, child) in node.children.iter().enumerate() {
+                if let Child::Light(light) = child {
+                    let light = *light as usize;
+                    sums[i][lane] = f64::from(weights[light]) * f64::from(self.gains[light]);
+                }
             }
-            if node.parent != NONE {
-                sums[node.parent as usize] += sums[i];
+            let (parent, lane) = node.parent;
+            let sum: f64 = sums[i].iter().sum();
+            if let Some(above) = sums.get_mut(parent as usize) {
+                above[lane as usize] = sum;
             }
         }
-        sums.iter().map(|s| *s as f32).collect()
+        sums.iter().map(|s| s.map(|s| s as f32)).collect()
     }
 
     /// Whether it holds a light.
     #[inline]
     pub fn holds(&self, light: usize) -> bool {
-        self.leaves[light] != NONE
-    }
-
-    #[inline]
-    fn importance(&self, strengths: &[f32], node: usize, place: &Place) -> f32 {
-        strengths[node] * self.nodes[node].reach.importance(place)
+        self.leaves[light].0 != NONE
     }
 
     /// What all lights together may give to a place. The bound of a node says little from within, so those are opened.
-    pub fn total(&self, strengths: &[f32], place: &Place) -> f32 {
+    pub fn total(&self, strengths: &[Lanes], place: &Place) -> f32 {
         let (mut sum, mut opened) = (0.0, 0);
-        let mut open = [0; OPENED + 1];
+        let mut open = [0u32; OPENED + 1];
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let at = open[count];
+            let at = open[count] as usize;
             let node = &self.nodes[at];
-            if node.light == NONE && opened < OPENED && node.reach.contains(place.p) {
-                (open[count], open[count + 1]) = (node.second as usize, at + 1);
-                count += 2;
-                opened += 1;
-            } else {
-                sum += self.importance(strengths, at, place);
+            let each = node.reach.importance(&strengths[at], place);
+            for (lane, child) in node.children.iter().enumerate() {
+                match child {
+                    Child::Node(child) if opened < OPENED && node.reach.contains(lane, place.p) => {
+                        open[count] = *child;
+                        count += 1;
+                        opened += 1;
+                    }
+                    Child::Empty => {}
+                    _ => sum += each[lane],
+                }
             }
         }
         sum
@@ -118,46 +130,78 @@ impl LightTree {
 
     /// What a light of unit weight may give to a place.
     pub fn alone(&self, light: usize, place: &Place) -> f32 {
-        self.gains[light] * self.nodes[self.leaves[light] as usize].reach.importance(place)
+        let (node, lane) = self.leaves[light];
+        self.nodes[node as usize].reach.importance(&[self.gains[light]; LANES], place)[lane as usize]
     }
 
     /// Selects a light for a place by `u`; `None` where no light may give any.
-    pub fn sample(&self, strengths: &[f32], place: &Place, mut u: f32) -> Option<Choice> {
+    #[inline]
+    pub fn sample(&self, strengths: &[Lanes], place: &Place, mut u: f32) -> Option<Choice> {
         let (mut node, mut pmf) = (0, 1.0f32);
-        while self.nodes[node].light == NONE {
-            let second = self.nodes[node].second as usize;
-            let first = self.share(strengths, (node + 1, second), place)?;
-            if u < first {
-                (node, pmf, u) = (node + 1, pmf * first, u / first);
-            } else {
-                (node, pmf, u) = (second, pmf * (1.0 - first), (u - first) / (1.0 - first));
+        loop {
+            let shares = self.shares(strengths, node, place)?;
+            // The child whose share of [0, 1) has the number, or by rounding the last with a share.
+            let (mut below, mut chosen) = (0.0, None);
+            for (lane, share) in shares.into_iter().enumerate() {
+                if share > 0.0 && (chosen.is_none() || u >= below) {
+                    chosen = Some((lane, below, share));
+                }
+                below += share;
             }
-            u = u.min(ONE_MINUS_EPSILON);
+            let (lane, below, share) = chosen?;
+            u = ((u - below) / share).clamp(0.0, ONE_MINUS_EPSILON);
+            pmf *= share;
+            match self.nodes[node].children[lane] {
+                Child::Node(child) => node = child as usize,
+                Child::Light(light) => return (pmf > 0.0).then_some(Choice { index: light as usize, pmf, u }),
+                Child::Empty => return None,
+            }
         }
-        (pmf > 0.0).then_some(Choice { index: self.nodes[node].light as usize, pmf, u })
     }
 
     /// Probability with which `sample` selects a light.
-    pub fn pmf(&self, strengths: &[f32], place: &Place, light: usize) -> f32 {
-        let (mut node, mut pmf) = (self.leaves[light] as usize, 1.0f32);
-        while self.nodes[node].parent != NONE {
-            let parent = self.nodes[node].parent as usize;
-            let second = self.nodes[parent].second as usize;
-            let Some(first) = self.share(strengths, (parent + 1, second), place) else { return 0.0 };
-            pmf *= if node == second { 1.0 - first } else { first };
-            node = parent;
+    pub fn pmf(&self, strengths: &[Lanes], place: &Place, light: usize) -> f32 {
+        let (mut node, mut lane) = self.leaves[light];
+        let mut pmf = 1.0f32;
+        while node != NONE {
+            let Some(shares) = self.shares(strengths, node as usize, place) else { return 0.0 };
+            pmf *= shares[lane as usize];
+            (node, lane) = self.nodes[node as usize].parent;
         }
         pmf
     }
 
-    /// Probability of the first of two nodes; `None` if neither gives light.
+    /// Probabilities of a node's children; `None` if none gives light.
     #[inline]
-    fn share(&self, strengths: &[f32], (first, second): (usize, usize), place: &Place) -> Option<f32> {
-        let (a, b) = (self.importance(strengths, first, place), self.importance(strengths, second, place));
-        // Halves, for the sum of two large ones.
-        let sum = 0.5 * a + 0.5 * b;
-        (sum > 0.0 && sum.is_finite()).then(|| 0.5 * a / sum)
+    fn shares(&self, strengths: &[Lanes], node: usize, place: &Place) -> Option<Lanes> {
+        let each = self.nodes[node].reach.importance(&strengths[node], place);
+        let sum: f32 = each.iter().sum();
+        (sum > 0.0 && sum.is_finite()).then(|| each.map(|e| e / sum))
     }
+}
+
+/// Divides a range of lights into as many as a node has children, or single ones.
+fn parts(lights: &mut [(u32, LightBounds)], range: Range<usize>, weights: &[f32]) -> Vec<Range<usize>> {
+    let mut parts = vec![range];
+    while parts.len() < LANES {
+        // Divide what is strongest and largest.
+        let cost = |part: &Range<usize>| {
+            let own = &lights[part.clone()];
+            let strength: f32 = own.iter().map(|(i, light)| weights[*i as usize] * light.gain).sum();
+            let cost = strength * around(own).radius;
+            if own.len() > 1 { 1.0 + cost } else { 0.0 }
+        };
+        let costs: Vec<f32> = parts.iter().map(cost).collect();
+        let most = (0..parts.len()).fold(0, |best, i| if costs[i] > costs[best] { i } else { best });
+        let part = parts[most].clone();
+        if part.len() < 2 {
+            break;
+        }
+        let middle = part.start + split(&mut lights[part.clone()], weights);
+        parts[most] = part.start..middle;
+        parts.insert(most + 1, middle..part.end);
+    }
+    parts
 }
 
 /// Bounds of several lights. Their strength counts the gains already.
