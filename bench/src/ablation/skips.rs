@@ -113,6 +113,14 @@ pub const SKIPS: &[Skip] = &[
         without: Without::Plan(|p| p.threshold = 0.0),
     },
     Skip {
+        name: "far-lights",
+        what: "most shadow rays to lights that are far from what they would light, or behind it",
+        scene: "scenes/stress/many-lights.toml",
+        integrator: Path,
+        settings: AS_THEY_ARE,
+        without: Without::Scene(|scene| scene.selector.forget_places()),
+    },
+    Skip {
         name: "unseen-lights",
         what: "most shadow rays to lights that reach little of what is seen",
         scene: "scenes/stress/hidden-lights.toml",

@@ -64,6 +64,11 @@ impl LightSelector {
         Self { places, ..Self::new(&mixed) }
     }
 
+    /// From now on all places are alike.
+    pub fn forget_places(&mut self) {
+        self.places = None;
+    }
+
     /// Whether no light can be chosen.
     #[inline]
     pub fn is_empty(&self) -> bool {
