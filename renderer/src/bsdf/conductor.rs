@@ -1,6 +1,6 @@
 use super::microfacet::{Microfacet, SMOOTH_ALPHA, reflecting_facet};
 use super::resolve::At;
-use super::{BsdfSample, Distribution, Lobe, Model, Roughness, Transport, fresnel};
+use super::{BsdfSample, Distribution, Lobe, Lobes, Model, Roughness, Transport, fresnel};
 use crate::math::{Vec2, Vec3};
 use crate::spectrum::Rgb;
 use crate::texture::RgbParam;
@@ -64,6 +64,11 @@ impl Model for Conductor {
     #[inline]
     fn chooses(&self) -> bool {
         false
+    }
+
+    #[inline]
+    fn lobes(&self, _: Vec3) -> Option<Lobes> {
+        self.facets.as_ref().map(|facets| Lobes { diffuse: 0.0, specular: 1.0, alpha: facets.most_alpha() })
     }
 
     fn albedo(&self) -> Rgb {

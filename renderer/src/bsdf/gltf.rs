@@ -1,7 +1,7 @@
 use super::dielectric::{Split, radiance_scale};
 use super::microfacet::{Microfacet, reflecting_facet, refracting_facet};
 use super::resolve::At;
-use super::{BsdfSample, Distribution, Lobe, Model, Spread, Transport, fresnel};
+use super::{BsdfSample, Distribution, Lobe, Lobes, Model, Spread, Transport, fresnel};
 use crate::math::{INV_PI, Vec2, Vec3, lerp, sqr};
 use crate::sampling::warp;
 use crate::spectrum::Rgb;
@@ -239,6 +239,16 @@ impl Model for Gltf {
         let rough = self.facets.is_some_and(|f| f.least_alpha() >= BROAD_ALPHA);
         let coated = self.metallic <= 0.5 && self.transmission == 0.0 && self.diffuse_albedo().max_component() > 0.0;
         if rough && coated { Spread::Broad } else { Spread::Narrow }
+    }
+
+    #[inline]
+    fn lobes(&self, wo: Vec3) -> Option<Lobes> {
+        let facets = self.facets.as_ref()?;
+        let schlick = fresnel::schlick_weight(wo.z.abs());
+        let metal = lerp(schlick, self.base.luminance(), 1.0);
+        let coat = lerp(schlick, self.f0(), 1.0);
+        let diffuse = self.diffuse_albedo().luminance() * self.passes_coat(wo.z);
+        Some(Lobes { diffuse, specular: lerp(self.metallic, coat, metal), alpha: facets.most_alpha() })
     }
 
     fn albedo(&self) -> Rgb {

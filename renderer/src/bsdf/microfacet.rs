@@ -31,6 +31,12 @@ impl Microfacet {
         self.alpha.min_element()
     }
 
+    /// Roughness along the rougher axis.
+    #[inline]
+    pub fn most_alpha(&self) -> f32 {
+        self.alpha.max_element()
+    }
+
     /// Density of facet normals `wm` (upper hemisphere, unit) per solid angle and projected area.
     #[inline]
     pub fn d(&self, wm: Vec3) -> f32 {

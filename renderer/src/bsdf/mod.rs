@@ -110,6 +110,17 @@ pub enum Spread {
     Narrow,
 }
 
+/// What a surface reflects, roughly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lobes {
+    /// Luminance of the albedo of a diffuse lobe.
+    pub diffuse: f32,
+    /// And of a rough one around the mirrored direction.
+    pub specular: f32,
+    /// Its roughness (Walter et al. 2007).
+    pub alpha: f32,
+}
+
 /// A direction drawn from a BSDF, in the shading frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
@@ -156,6 +167,11 @@ pub trait Model: Copy {
     /// The value of all directions on the upper side, seen from there, if it is the same for all of them, there is none elsewhere, and
     /// directions are drawn in proportion to the cosine.
     fn even(&self) -> Option<Rgb> {
+        None
+    }
+
+    /// What its reflection in direction `wo` is made of, roughly, if one rough lobe stands out; it says nothing of what passes.
+    fn lobes(&self, _wo: Vec3) -> Option<Lobes> {
         None
     }
 
@@ -256,6 +272,12 @@ macro_rules! bsdfs {
             #[inline]
             pub fn even(&self) -> Option<Rgb> {
                 match self { $(Self::$name(m) => m.even(),)* }
+            }
+
+            /// What its reflection is made of; see [`Model::lobes`].
+            #[inline]
+            pub fn lobes(&self, wo: Vec3) -> Option<Lobes> {
+                match self { $(Self::$name(m) => m.lobes(wo),)* }
             }
 
             /// Rough reflectance for the albedo image, in [0, 1].

@@ -1,7 +1,7 @@
 //! The BSDF at a hit, in world space: frame, sides, normal maps.
 
 use super::resolve::At;
-use super::{Bsdf, Lambert, Lobe, Material, MaterialId, Transport};
+use super::{Bsdf, Lambert, Lobe, Lobes, Material, MaterialId, Transport};
 use crate::geometry::Interaction;
 use crate::math::{Frame, Vec2, Vec3};
 use crate::spectrum::Rgb;
@@ -125,6 +125,12 @@ impl ShadingPoint {
             Sides::Same => self.ng * self.wo_dot_ng.signum(),
             Sides::Any | Sides::Consistent => Vec3::ZERO,
         }
+    }
+
+    /// Unit direction to the previous vertex, and what of it is reflected.
+    #[inline]
+    pub fn lobes(&self) -> Option<(Vec3, Lobes)> {
+        Some((self.frame.to_world(self.wo), self.bsdf.lobes(self.wo)?))
     }
 
     /// What `bsdf` in `frame` is from `wo`; `bent`: the frame is that of a normal map.

@@ -28,7 +28,7 @@ pub use desc::{Emission, LightDesc, SpotFalloff};
 pub use directional::DirectionalLight;
 pub use environment::EnvironmentLight;
 pub use learn::{LightLessons, selection_weights};
-pub use place::{LightBounds, Place};
+pub use place::{Gloss, LightBounds, Place};
 pub use point::PointLight;
 pub use sample::{LeSample, LiSample, LightContext, LightFlags};
 pub use select::LightSelector;

@@ -18,6 +18,30 @@ pub struct Place {
     pub p: Vec3,
     /// Unit normal of the half space from which light counts; zero where it counts from everywhere.
     pub up: Vec3,
+    /// What is reflected there, if not the same of light from all of that half space.
+    pub lobe: Option<Gloss>,
+}
+
+impl Place {
+    /// Where light from everywhere counts alike.
+    pub fn anywhere(p: Vec3) -> Self {
+        Self { p, up: Vec3::ZERO, lobe: None }
+    }
+}
+
+/// A glossy lobe over a diffuse one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gloss {
+    /// Unit shading normal, and unit direction in which light leaves.
+    pub n: Vec3,
+    /// On the side of `n`.
+    pub wo: Vec3,
+    /// Albedo of the diffuse lobe; not 0, since the lobe is known roughly only.
+    pub diffuse: f32,
+    /// About what the other reflects in all.
+    pub specular: f32,
+    /// Squared roughness.
+    pub alpha2: f32,
 }
 
 /// Directions of up to an angle from an axis.
@@ -171,14 +195,18 @@ impl Reach {
         (centre - p).length_squared() <= self.radius2[lane]
     }
 
-    /// Bounds of the irradiance that light of unit strength may give to a place, in 1 / m^2, times `strengths`; 0 only where it gives
-    /// none. Without branches, so that all are computed at once.
+    /// Bounds of the irradiance that light of unit strength may give to a place, in 1 / m^2, times `strengths` and about what the place
+    /// reflects; 0 only where it gives none. Without branches, so that all are computed at once.
     #[inline(always)]
     pub fn importance(&self, strengths: &Lanes, place: &Place) -> Lanes {
         let sided = place.up != Vec3::ZERO;
-        let mut result = Lanes::default();
+        let (mut result, mut gloss) = (Lanes::default(), Lanes::default());
+        if let Some(lobe) = &place.lobe {
+            gloss = self.reflected(place.p, lobe);
+        }
+        let diffuse = place.lobe.map_or(1.0, |lobe| lobe.diffuse);
         for i in 0..LANES {
-            let [x, y, z] = [0, 1, 2].map(|axis| self.centre[axis][i] - place.p[axis]);
+            let [x, y, z] = self.way(place.p, i);
             let distance2 = x * x + y * y + z * z;
             let radius2 = self.radius2[i];
             let within = distance2 <= radius2;
@@ -197,14 +225,54 @@ impl Reach {
             // The least angle of the light that arrives.
             let above = (place.up.x * x + place.up.y * y + place.up.z * z) * inverse;
             let arriving = less(with_sine(above), covered).0;
-            let to = if arriving < -ROUNDING { 0.0 } else { at_least(arriving) };
+            let to = diffuse * at_least(arriving) + gloss[i];
+            let to = if arriving < -ROUNDING { 0.0 } else { to };
             let to = if sided { to } else { 1.0 };
 
             let outside = from * to * inverse2;
-            result[i] = strengths[i] * if within { 1.0 / radius2 } else { outside };
+            result[i] = strengths[i] * if within { (diffuse + gloss[i]) / radius2 } else { outside };
         }
         result
     }
+
+    /// About what a lobe reflects of light from the middles of the spheres, times pi and the cosine: GGX, wider by what they cover. (A
+    /// half vector turns by half of what the direction turns.)
+    #[inline(always)]
+    fn reflected(&self, p: Vec3, lobe: &Gloss) -> Lanes {
+        let (n, wo) = (lobe.n, lobe.wo);
+        let cos_o = n.dot(wo);
+        let mut result = Lanes::default();
+        for (i, result) in result.iter_mut().enumerate() {
+            let [x, y, z] = self.way(p, i);
+            let inverse2 = 1.0 / at_least_tiny(x * x + y * y + z * z);
+            let inverse = inverse2.sqrt();
+            let sin2 = at_most_one(self.radius2[i] * inverse2);
+            let alpha2 = at_most_one(lobe.alpha2 + 0.25 * sin2);
+            let cos_i = (n.x * x + n.y * y + n.z * z) * inverse;
+            let between = (wo.x * x + wo.y * y + wo.z * z) * inverse;
+            let cos_h = positive(cos_i + cos_o);
+            let cos2_h = at_most_one(cos_h * cos_h / (2.0 * positive(1.0 + between) + 1e-6));
+            let t = cos2_h * (alpha2 - 1.0) + 1.0;
+            *result = lobe.specular * alpha2 / (4.0 * t * t);
+        }
+        result
+    }
+
+    /// From a point to the middle of one of them.
+    #[inline(always)]
+    fn way(&self, p: Vec3, lane: usize) -> [f32; 3] {
+        [self.centre[0][lane] - p.x, self.centre[1][lane] - p.y, self.centre[2][lane] - p.z]
+    }
+}
+
+#[inline]
+fn at_most_one(x: f32) -> f32 {
+    if x < 1.0 { x } else { 1.0 }
+}
+
+#[inline]
+fn at_least_tiny(x: f32) -> f32 {
+    if x > f32::MIN_POSITIVE { x } else { f32::MIN_POSITIVE }
 }
 
 #[inline]

@@ -95,6 +95,12 @@ impl LightSelector {
         }
     }
 
+    /// Whether it makes a difference for which place a light is chosen.
+    #[inline]
+    pub fn by_place(&self) -> bool {
+        self.places.is_some()
+    }
+
     /// Probability of light `i` for a place.
     #[inline]
     pub fn pmf_at(&self, place: &Place, i: usize) -> f32 {

@@ -1,12 +1,16 @@
 //! What scatters at a vertex, surface or medium, in one interface.
 
-use crate::bsdf::{DirectionSample, Lobe, Material, MaterialId, ShadingPoint, Transport};
+use crate::bsdf::{DirectionSample, Lobe, Lobes, Material, MaterialId, ShadingPoint, Transport};
 use crate::geometry::Interaction;
+use crate::light::{Gloss, Place};
 use crate::math::{Vec2, Vec3};
 use crate::medium::Medium;
 use crate::sampling::Sampler;
 use crate::spectrum::Rgb;
 use crate::texture::Texture;
+
+/// Share of a rough lobe that counts as diffuse where lights are selected: its shape is known roughly only.
+const SURE: f32 = 0.01;
 
 /// A point of a medium that scatters, seen from `wo`. The scattering coefficient is in the weight of the flight that came here; what is
 /// left is the phase function.
@@ -141,13 +145,21 @@ impl Scattering {
         }
     }
 
-    /// Unit normal of the half space from which light is reflected; zero where it may come from everywhere.
+    /// The point `p` where it scatters, as lights are selected for it.
     #[inline]
-    pub fn up(&self) -> Vec3 {
-        match self {
-            Self::Surface(shading) => shading.up(),
-            Self::Medium(_) => Vec3::ZERO,
+    pub fn place(&self, p: Vec3) -> Place {
+        let Self::Surface(shading) = self else { return Place::anywhere(p) };
+        let up = shading.up();
+        if up == Vec3::ZERO {
+            return Place::anywhere(p);
         }
+        let gloss = |(wo, lobes): (Vec3, Lobes)| {
+            let n = shading.frame.n;
+            let n = if wo.dot(n) < 0.0 { -n } else { n };
+            let specular = lobes.specular;
+            Gloss { n, wo, diffuse: lobes.diffuse + SURE * specular, specular, alpha2: lobes.alpha * lobes.alpha }
+        };
+        Place { p, up, lobe: shading.lobes().map(gloss) }
     }
 
     /// The shading normal; a medium has none, zero.

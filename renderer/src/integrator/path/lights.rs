@@ -5,7 +5,7 @@ use super::split::{LIGHTS, of_direction, of_light};
 use super::{Arrival, Here, Leg, Walk};
 use crate::bsdf::Transport;
 use crate::geometry::Interaction;
-use crate::light::{LiSample, Place};
+use crate::light::LiSample;
 use crate::math::{Ray, Vec2, Vec3};
 use crate::medium::passing_probability;
 use crate::sampling::{Choice, Sampler};
@@ -49,7 +49,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
             let weight = if arrival.alone {
                 1.0
             } else {
-                let pdf_light = self.c.selector.pmf_at(&arrival.place(), i as usize) * light.pdf_li_escaped(ray.d);
+                let pdf_light = self.c.selector.pmf_at(&arrival.place, i as usize) * light.pdf_li_escaped(ray.d);
                 of_direction(arrival.pdf, pdf_light, arrival.lights)
             };
             sum += light.le_infinite(ray.d) * weight;
@@ -65,7 +65,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
         if radiance.is_black() || arrival.alone {
             return radiance;
         }
-        let pmf = self.c.selector.pmf_at(&arrival.place(), index as usize);
+        let pmf = self.c.selector.pmf_at(&arrival.place, index as usize);
         let pdf_light = pmf * light.pdf_li(&context, arrival.from.p, &hit.anchor());
         radiance * of_direction(arrival.pdf, pdf_light, arrival.lights)
     }
@@ -74,10 +74,9 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
     #[inline(always)]
     fn candidate(&mut self, here: Here, beta: Rgb, (uc, u): (f32, Vec2)) -> Option<Candidate> {
         let scene = self.c.scene;
-        let place = Place { p: here.anchor.p, up: here.scattering.up() };
-        let choice = self.c.selector.sample_at(&place, uc)?;
+        let choice = self.c.selector.sample_at(here.place, uc)?;
         if self.lessons.learns() {
-            let expected = f64::from(self.c.selector.expected(&place, choice.index)) * f64::from(beta.luminance());
+            let expected = f64::from(self.c.selector.expected(here.place, choice.index)) * f64::from(beta.luminance());
             self.lessons.expected(choice.index, choice.pmf, expected * expected);
         }
         let light = &scene.lights[choice.index];

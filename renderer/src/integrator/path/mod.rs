@@ -14,7 +14,7 @@ use crate::bsdf::Transport;
 use crate::film::{Aov, Counters, Rect, TileSums};
 use crate::geometry::{Interaction, ObjectId};
 use crate::light::{LightLessons, Place};
-use crate::math::{Anchor, Ray, Vec3};
+use crate::math::{Anchor, Ray};
 use crate::medium::{Channels, passing_probability};
 use crate::path::{MediumPoint, Scattering, roulette};
 use crate::sampling::{Sampler, SobolSampler};
@@ -71,16 +71,8 @@ struct Arrival {
     alone: bool,
     /// How many samples of lights the vertex before has taken.
     lights: u32,
-    /// From where light counts there ([`Place::up`]).
-    up: Vec3,
-}
-
-impl Arrival {
     /// The vertex before, as lights were selected for it.
-    #[inline]
-    fn place(&self) -> Place {
-        Place { p: self.from.p, up: self.up }
-    }
+    place: Place,
 }
 
 /// A flight before it is made.
@@ -100,6 +92,8 @@ struct Here<'a> {
     /// The object whose surface it is on; none in a medium.
     object: Option<ObjectId>,
     scattering: &'a Scattering,
+    /// The same, as lights are selected for it.
+    place: &'a Place,
 }
 
 /// One path, through media or not.
@@ -129,8 +123,9 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
         // Product of squared index ratios so far: radiance is scaled by it inside glass, which must not steer the roulette.
         let mut eta_scale = 1.0f32;
         let lens = Anchor::free(camera_ray.o);
-        let arrival = Arrival { from: lens, pdf: 0.0, alone: true, lights: 1, up: Vec3::ZERO };
+        let arrival = Arrival { from: lens, pdf: 0.0, alone: true, lights: 1, place: Place::anywhere(lens.p) };
         let mut leg = Leg { ray: camera_ray, around: scene.camera_enclosures, tau: Rgb::ZERO, arrival };
+        let selects = self.c.selector.by_place();
         let mut edges = 0;
         while edges < self.c.max_depth {
             edges += 1;
@@ -170,7 +165,8 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
                 anchor = hit.anchor();
                 object = Some(hit.object);
             }
-            let here = Here { anchor: &anchor, object, scattering: &scattering };
+            let place = if selects { scattering.place(anchor.p) } else { Place::anywhere(anchor.p) };
+            let here = Here { anchor: &anchor, object, scattering: &scattering, place: &place };
             if let (1, Some(aov)) = (edges, self.aov.as_deref_mut()) {
                 aov.add(&tile::shown(here.scattering, &lens, here.anchor));
             }
@@ -220,8 +216,7 @@ impl<const MEDIA: bool, const SHARE: bool> Walk<'_, '_, MEDIA, SHARE> {
             }
             eta_scale *= s.eta * s.eta;
             leg.ray = here.anchor.ray(s.wi);
-            leg.arrival =
-                Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta, lights, up: here.scattering.up() };
+            leg.arrival = Arrival { from: *here.anchor, pdf: s.pdf, alone: s.lobe.delta, lights, place };
             if MEDIA {
                 leg.around = scene.beside(here.object, here.anchor, s.wi, &leg.around);
             }

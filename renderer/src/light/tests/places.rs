@@ -1,12 +1,20 @@
 //! Selecting lights for a place.
 
-use super::super::place::{Cone, LANES, LightBounds, Place, Reach};
+use super::super::place::{Cone, Gloss, LANES, LightBounds, Place, Reach};
 use super::super::{LightSelector, roster};
-use crate::math::{Vec3, safe_acos};
+use crate::math::{Vec3, pow, safe_acos};
 use crate::sampling::{IndependentSampler, Sampler, warp};
 
 fn direction(s: &mut IndependentSampler) -> Vec3 {
     warp::uniform_sphere(s.next_2d())
+}
+
+/// A lobe, or none.
+fn glossy(s: &mut IndependentSampler) -> Option<Gloss> {
+    let (n, wo) = (direction(s), direction(s));
+    let wo = wo * n.dot(wo).signum();
+    let alpha2 = pow(10.0, -8.0 * s.next_1d());
+    (s.next_1d() < 0.7).then_some(Gloss { n, wo, diffuse: 0.01, specular: 1.0, alpha2 })
 }
 
 /// Where a light gives any, its bound is not 0.
@@ -21,8 +29,8 @@ fn no_light_is_left_out() {
         let importance = |place: &Place| reach.importance(&[1.0; LANES], place)[0];
         for p in example.points() {
             for _ in 0..64 {
-                let place = Place { p, up: direction(&mut s) };
-                let anywhere = importance(&Place { p, up: Vec3::ZERO });
+                let place = Place { up: direction(&mut s), lobe: glossy(&mut s), ..Place::anywhere(p) };
+                let anywhere = importance(&Place::anywhere(p));
                 let Some(li) = example.light.sample_li(&example.ctx(), p, s.next_1d(), s.next_2d()) else {
                     dark += u32::from(anywhere == 0.0);
                     continue;
@@ -92,7 +100,7 @@ fn frequencies_are_the_probabilities() {
         for selector in [selector.mixed(&learned), selector] {
             for distance in [0.0, 0.5, 3.0, 1e3] {
                 let up = if distance == 0.5 { Vec3::ZERO } else { direction(&mut s) };
-                let place = Place { p: direction(&mut s) * distance, up };
+                let place = Place { up, lobe: glossy(&mut s), ..Place::anywhere(direction(&mut s) * distance) };
                 let pmf: Vec<f64> = (0..lights as usize).map(|i| f64::from(selector.pmf_at(&place, i))).collect();
                 let n = 50_000;
                 let (mut counts, mut rest) = (vec![0.0; lights as usize], vec![0.0; 16]);
@@ -129,7 +137,7 @@ fn frequencies_are_the_probabilities() {
 fn near_lights_come_first() {
     let lamp = |x: f32| Some(LightBounds::point(Vec3::new(x, 0.0, 0.0)));
     let selector = LightSelector::placed(&[1.0, 1.0, 1.0], &[lamp(0.0), lamp(100.0), None], 100.0);
-    let place = |up| Place { p: Vec3::new(1.0, 0.0, 0.0), up };
+    let place = |up| Place { up, ..Place::anywhere(Vec3::new(1.0, 0.0, 0.0)) };
     assert!(selector.pmf_at(&place(Vec3::ZERO), 0) > 0.99);
     assert_eq!(selector.pmf_at(&place(Vec3::X), 0), 0.0, "it is behind the surface");
     assert!(selector.pmf_at(&place(Vec3::X), 1) > 0.1 && selector.pmf_at(&place(Vec3::X), 2) > 0.1);
